@@ -5,31 +5,32 @@ satisfies
 
     A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     h_k the part of branch k [Pa m].
 
-A step advances `h_k <- decay_k h_k + gain_k du + back_k du_before` with the increments of u in this step and in the
-step before it. For z = dt/tau_k and phi(z) = (1 - exp(-z))/z,
+A step advances `h_k <- decay_k h_k + gain_k du + back_k du_before` with the increments du of u in this step and
+du_before in the step before. For z = dt/tau_k and phi(z) = (1 - exp(-z))/z,
 
     exponential          decay = exp(-z),     gain = G_k (phi + kappa q),   back = -G_k kappa q r,
     exponential-linear   decay = exp(-z),     gain = G_k phi,               back = 0,
     backward-euler       decay = 1/(1 + z),   gain = G_k/(1 + z),           back = 0.
 
-The first is exact for u quadratic in time, through its last two values and the new one: with r = dt/dt_before,
+The first rule is exact for u quadratic in time through the last two values and the new one: with r = dt/dt_before,
 
     u(s) = u + s du + s (s - 1) kappa/2 (du - r du_before),   kappa = 2 r/(1 + r),   0 <= s <= 1,
     q(z) = (1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2.
 
-After a jump and in the first step of a stage, kappa is 0. The second is exact for u linear in time. The third is
-equivalent to Eqs. (7)-(9) of the paper. With `alpha = G_inf + sum gain_k` and `r = sum decay_k h_k - (sum gain_k) u
-+ (sum back_k) du_before`, it follows that `A p = alpha u_new + r`: the contact problem of a step is that of an
-elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9). Displacements belong to
-points of the body, not of the moving surface.
+After a jump and in the first step of a stage, kappa is 0. The second rule is exact for u linear in time. The third is
+equivalent to Eqs. (7)-(9) of the paper. With `alpha = G_inf + sum gain_k` and `r = sum decay_k h_k - (sum gain_k) u +
+(sum back_k) du_before`, it follows that `A p = alpha u_new + r`: a step is a contact problem of an elastic body of
+modulus alpha with the effective heights `h + r/alpha` (paper, Eq. 9). Displacements belong to points of the body, not
+of the moving surface.
 
-A body has the methods `begin` and `commit`, which take and return a `BodyMemory`; after a dropped step, the memory
-from which it began is still valid. A step of length 0 is a jump of the load: the body answers with its modulus at once.
-A body without relaxing branches (`branched` is None) may have a method `time_error(memory, trial, dt)`, which returns
-the relative error of a step by its length.
+A body has the methods `begin` and `commit`, which take and return a `BodyMemory`; after a dropped step, the memory from
+which the step began is still valid. A step of length 0 is a jump of the load, without relaxation. A body without
+relaxing branches (`branched` is None) may have a method `time_error(memory, trial, dt)`, which returns the relative
+error that the length of a step causes.
 
-Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless ones, for
-which `h_k = gain du + back du_before`, and frozen ones, which are springs `h_k = G_k u`."""
+Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless branches,
+for which `h_k = gain du + back du_before`, and frozen branches, which are springs `h_k = G_k u`.
+"""
 
 import math
 from collections.abc import Callable, Collection, Iterable
@@ -60,11 +61,11 @@ class BodyMemory:
     """Memory of a body between two steps, on the rows of this rank: displacement of its surface, its `increment` in the
     last step, and the branch maps.
 
-    `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over
-    the last step. The next `begin` makes it, with the increment in that step and the one `before`, and puts the
-    effective heights into the map `before`. This leaves the meaning of the memory unchanged, so that another step
-    may begin from it. Memories before and after a step share all maps but the displacement: the memory before is
-    invalid once a step has begun from the memory after.
+    `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over the
+    last step, which the next `begin` makes, with the increments in this step and in the step before (map `before`); the
+    effective heights then replace `before`. The memory keeps its meaning, so that another step may begin from it.
+    Memories before and after a step share all maps but the displacement: the memory before is invalid once a step has
+    begun from the memory after.
     """
 
     displacement: Array | None
@@ -76,10 +77,10 @@ class BodyMemory:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step of a body that has begun; it may be dropped without any call.
+    """A step of a body that has begun; the step may be dropped without any call.
 
-    Its contact problem is that of an elastic body of modulus `alpha` under the `effective` heights, a map that is
-    valid until the next step begins. `advance` has the coefficients of the branches over the step.
+    Its contact problem has an elastic body of modulus `alpha` and the `effective` heights, a map that is valid until
+    the next step begins. `advance` has the coefficients of the branches over the step.
     """
 
     alpha: float
@@ -111,8 +112,8 @@ class ElasticBody:
         """Do nothing: the displacement follows from the pressure."""
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step under the heights themselves; local to this rank. The displacement of `memory` is dropped: it is
-        in a map of the solver, which the next solve overwrites."""
+        """Begin a step whose effective heights are the heights; local. The displacement of `memory` is dropped, as the
+        next solve overwrites its map."""
         memory.displacement = None
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights, NO_BRANCHES)
@@ -121,12 +122,12 @@ class ElasticBody:
         return Trial(self.modulus, self._moved, heights, NO_BRANCHES)
 
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
-        """Return a memory with the displacement; it is valid until the next step begins."""
+        """Return the memory after a step with this displacement, valid until the next step begins."""
         return replace(memory, displacement=displacement)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement; if it was dropped, compute it from `of_pressure()`, the displacement under p, for
-        the pressure `alpha p`; collective."""
+        """Return the displacement under the pressure `alpha p`; collective. If it was dropped, it is computed from
+        `of_pressure()`, the displacement under p for the modulus 1."""
         if memory.displacement is None:
             memory.displacement = of_pressure()
             memory.displacement *= alpha / self.modulus  # 1 after a step of this body
@@ -152,10 +153,10 @@ class _Coefficients:
 
 
 class ZenerBody:
-    """A body with relaxing branches, which have their numbers in `prony`.
+    """A body with relaxing branches, given by their numbers in `prony`.
 
-    Branches of `kept` have one map each, in this order; `memoryless` and `frozen` ones have none. All but the frozen
-    ones are `moving`. `shortest_time` [s] is the shortest relaxation time of `kept`.
+    Branches of `kept` have one map each, in this order; `memoryless` and `frozen` branches have none. All but the
+    frozen branches are `moving`. `shortest_time` [s] is the shortest relaxation time of `kept`.
     """
 
     def __init__(
@@ -187,7 +188,7 @@ class ZenerBody:
         return elapsed(self.prony, dt)
 
     def coefficients(self, dt: float, growth: float = 0.0) -> Advance:
-        """Return the advance of each branch over a step dt, `growth` times as long as the step before it."""
+        """Return the coefficients of the branches for a step dt, `growth` times as long as the step before it."""
         return coefficients(self.prony, self.integrator, dt, growth)
 
     def at_rest(self) -> BodyMemory:
@@ -196,7 +197,7 @@ class ZenerBody:
         return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
-        """Put a displacement and the map of each branch of `prony`, in order, into a memory."""
+        """Put a displacement and the map of each branch of `prony`, in order, into `memory`."""
         surface_of(memory)[...] = displacement
         for k, branch in enumerate(branches):
             if k in self.kept:
@@ -204,8 +205,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus alpha under the effective heights `h + r/alpha`; local to this rank. It replaces a
-        step that has begun from the same memory.
+        """Begin a step of modulus alpha with the effective heights `h + r/alpha`; local to this rank. The step replaces
+        another one that has begun from the same memory.
 
         `growth` is dt over the length of the step before; 0 after a jump and in the first step of a stage.
         """
@@ -234,7 +235,7 @@ class ZenerBody:
         return surface_of(memory)
 
     def advance_branches(self, memory: BodyMemory) -> None:
-        """Bring the branch maps to the end of the last step, for whoever reads them. Results do not change."""
+        """Advance the branch maps to the end of the last step, so that they can be read. Results do not change."""
         if self.slab.only_counts:
             return
         u = surface_of(memory)
@@ -243,7 +244,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return the entries of the memory, and the moduli and relaxation times, which a checkpoint must match."""
+        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which a checkpoint must
+        match."""
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),
@@ -253,10 +255,10 @@ class ZenerBody:
     def memory_entries(
         self, memory: BodyMemory, unit: float, symbol: str, branch_unit: float, branch_symbol: str
     ) -> dict[str, Entry]:
-        """Return entries of the displacement, its last increment, the branch maps and the frozen branches, with the
-        units of displacements and of branch maps.
+        """Return checkpoint entries of displacement, last increment, branch maps and frozen branches.
 
-        Branch maps are optional, as a branch may have had no map when a checkpoint was written.
+        `unit` and `symbol` belong to displacements, `branch_unit` and `branch_symbol` to branch maps. Branch maps are
+        optional, as a branch may have had no map when a checkpoint was written.
         """
         self.advance_branches(memory)
         frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
@@ -267,8 +269,8 @@ class ZenerBody:
         return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`. A branch without a map in `saved`
-        starts as `G_k u` if it was frozen, else as 0."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`. A branch without a map in
+        `saved` starts as `G_k u` if it was frozen, else as 0."""
         for k, branch in zip(self.kept, memory.branches, strict=True):
             if f"branch {k}" not in saved:
                 branch[...] = self.prony.moduli[k] * saved["frozen"][k] * surface_of(memory)
@@ -276,7 +278,7 @@ class ZenerBody:
 
 
 def surface_of(memory: BodyMemory) -> Array:
-    """Return the displacement of a body that stores it."""
+    """Return the surface displacement from the memory of a body that stores it."""
     assert memory.displacement is not None
     return memory.displacement
 
@@ -285,10 +287,10 @@ Body = ElasticBody | ZenerBody
 
 
 def remembers(body: Body) -> bool:
-    """Return False for an elastic body; any other body has a memory."""
+    """Return True if the body has a memory, which all but an elastic body have."""
     return type(body) is not ElasticBody
 
 
 def states_errors(body: Body) -> bool:
-    """Return True unless the body has a memory, and neither branches nor a `time_error`."""
+    """Return False for a body with a memory that has neither branches nor a method `time_error`."""
     return not remembers(body) or body.branched is not None or hasattr(body, "time_error")

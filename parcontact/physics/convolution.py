@@ -1,24 +1,20 @@
-"""Convolutions on a grid and on its tiles.
+"""Convolutions on a grid, by a symbol on the wavenumbers of a transform or by coefficients in space, and on tiles.
 
-Convolutions on a grid, by a symbol on the wavenumbers of a transform or by coefficients in space.
-
-Operators on tiles, and from tiles to the whole grid: their cost follows the points of tiles, not of the box.
+Operators on tiles, and from tiles to the whole grid, have a cost that follows the points of tiles, not of the box.
 
 The coefficients between two tiles depend on their offset only, and are split (P. P. Ewald, Ann. Phys. 369 (1921)
 253) with a length s and the distance r:
 
     1/r = (1 - erf(r/s))/r + erf(r/s)/r.
 
-The first part vanishes beyond `REACH s`: it is a cyclic convolution between near tiles, of twice their side. The
-second part varies over s: loads of points are transferred to the nodes of a regular grid, at distances of
-`s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A.
-Brandt and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell.
-The error is below 1e-6 of the displacement.
+The first part vanishes beyond `REACH s`: it is computed as a cyclic convolution between near tiles, of twice their
+side. The second part varies over lengths of s: loads of points are transferred to the nodes of a regular grid, at
+distances of `s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are
+interpolated (A. Brandt and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means
+over a cell. The error is below 1e-6 of the displacement.
 
-Tiles of a grid, and convolutions between near tiles.
-
-Maps of T tiles of SIDE x SIDE points are stacked to one of `T SIDE` rows. The coefficients between two tiles depend
-on their offset only: the transforms of tiles, of twice their side, are multiplied and summed.
+Maps of T tiles of SIDE x SIDE points are stacked to one map of `T SIDE` rows. Transforms of near tiles, of twice their
+side, are multiplied and summed.
 """
 
 import math
@@ -45,8 +41,8 @@ PARTS = 16  # tuning: parts of a spectrum that are computed one after the other,
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    `part(rows)` returns the symbol on these rows of the spectrum. It is stored as `dtype`, times the scale of the
-    transforms, in `symbols` for each block of columns. If it is `even` in q_y, only rows of q_y >= 0 are made; with
+    `part(rows)` returns the symbol on these rows of the spectrum. The symbol is stored as `dtype`, times the scale of
+    the transforms, in `symbols` for each block of columns. If it is `even` in q_y, only rows of q_y >= 0 are made; with
     `later` they are made at the first use.
     """
 
@@ -74,7 +70,7 @@ class Convolution:
         return symbols
 
     def mapped(self, function: Callable[[NDArray[np.inexact]], NDArray[np.inexact]], dtype: DTypeLike) -> "Convolution":
-        """Return the operator whose symbol is `function` of this one's."""
+        """Return the operator whose symbol is `function(symbol)` of this operator's symbol."""
         scale = self.fft.mx * self.fft.my
 
         def part(rows: slice) -> NDArray[np.inexact]:
@@ -97,9 +93,9 @@ class Convolution:
     def loss(self, field: Array, size: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return `-sum p du/ds` for a field p and its image u, with the slope along a unit `direction`; collective.
 
-        In Fourier space this is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size`, or of the
-        padded box. For a pressure under a surface that slides along s at the speed v, it is the dissipated power
-        over v. It is 0 for a real symbol, as that of an elastic body.
+        In Fourier space this is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size`, or of the padded
+        box. For a pressure under a surface that slides along s at the speed v, the sum is the dissipated power divided
+        by v. The sum is 0 for a real symbol, such as the symbol of an elastic body.
         """
         total, spectrum = 0.0, self.fft.forward(field)
         lengths = size[0] * self.fft.mx / self.fft.slab.nx, size[1] * self.fft.my / self.fft.slab.ny
@@ -115,10 +111,10 @@ class Convolution:
 
 
 class MirroredConvolution:
-    """A linear operator on maps that continue mirrored at their edges, by its real symbol on `cosines`.
+    """A linear operator on maps that are continued mirrored at their edges, by its real symbol on `cosines`.
 
-    `part(rows)` returns the symbol of the real parts of the spectrum as its real part, and the symbol of the
-    imaginary parts as its imaginary part.
+    `part(rows)` returns complex numbers: their real part is the symbol for the real parts of the spectrum, their
+    imaginary part is the symbol for the imaginary parts.
     """
 
     def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
@@ -158,15 +154,15 @@ def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple
 
 
 def travelling_wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Return `wavenumbers` with 0 for those of Nyquist, which have two signs: the slope of such a wave is 0 on the
-    grid."""
+    """Return `wavenumbers` with 0 for the Nyquist wavenumbers, which have two signs: the slope of such a wave is 0 on
+    the grid."""
     qx, qy = wavenumbers(fft, size, rows)
     along_x, along_y = fft.modes
     return np.where(2 * np.abs(along_x) == fft.mx, 0.0, qx), np.where(2 * np.abs(along_y[rows]) == fft.my, 0.0, qy)
 
 
 def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
-    """Return lengths of fast transforms of a free half space, at least twice those of the box."""
+    """Return the lengths of fast transforms for a free half space, at least twice the lengths nx and ny of the box."""
     return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
 
 
@@ -178,11 +174,13 @@ def tabulate(
     inside: bool = False,
     symmetric: bool = True,
 ) -> NDArray[np.complexfloating]:
-    """Return the symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at the distance
-    (x, y) [length] from a cell under unit pressure; collective. No rank holds the whole table.
+    """Return the symbol, on the padded transform `fft`, of a table of influence coefficients; collective. No rank holds
+    the whole table.
 
-    A coefficient that is `even` in x and y is computed once per distance, and for half of these if it is `symmetric` in
-    x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at its next call.
+    `coefficient(x, y, dx, dy)` is the displacement at the distance (x, y) [length] from a cell under unit pressure. A
+    coefficient that is `even` in x and y is computed once per distance, and for half of the distances if it is
+    `symmetric` in x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at
+    the next call of the transform.
     """
     transform = table_transform(fft, inside)
     if fft.slab.only_counts:
@@ -201,7 +199,7 @@ def tabulate(
 
 
 def table_transform(fft: FFT, inside: bool) -> FFT:
-    """Return the transform of a table of coefficients with the lengths of `fft`; collective."""
+    """Return the transform for a table of coefficients, with the lengths of `fft`; collective."""
     sharing = fft if inside and fft.dtype == np.float64 else None
     return FFT(fft.slab.resized(fft.mx, fft.my), measured=fft.measured, sharing=sharing)
 
@@ -229,8 +227,8 @@ LONGEST_CELL = 2.0  # tuning: largest ratio of sides of a cell for which tiles a
 
 @dataclass(frozen=True)
 class Tiles:
-    """Tiles of a grid of `points = (nx, ny)`, given by their rows and columns among all tiles. The end of the grid may
-    cut the last ones."""
+    """Tiles of a grid of `points = (nx, ny)`, given by their rows and columns among all tiles. The last tiles may be
+    cut at the end of the grid."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
@@ -242,7 +240,7 @@ class Tiles:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Shape of a stacked map."""
+        """Shape of a map in which all tiles are stacked."""
         return self.count * SIDE, SIDE
 
     @cached_property
@@ -255,7 +253,7 @@ class Tiles:
 
 
 def tiles_along(points: tuple[int, int]) -> tuple[int, int]:
-    """Return the numbers of tiles along x and y."""
+    """Return the numbers of tiles along x and y for a grid of (nx, ny) points."""
     return -(-points[0] // SIDE), -(-points[1] // SIDE)
 
 
@@ -289,14 +287,15 @@ class TileConvolution:
         return out
 
     def transform(self, field: Array) -> None:
-        """Transform a stacked map, for `at`."""
+        """Transform a stacked map; `at` then returns results."""
         self._padded[:, :SIDE, :SIDE] = field.reshape(-1, SIDE, SIDE)
         self._padded[:, SIDE:, :] = 0.0
         self._padded[:, :SIDE, SIDE:] = 0.0
         self._forward.execute()
 
     def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
-        """Yield the result of the transformed map on tiles of a row of tiles, each valid until the next one."""
+        """Yield the result for the transformed map on each of the tiles `columns` in a row of tiles, each valid until
+        the next one."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
             self._add_up(rows, columns[place : place + 1], own)
@@ -309,7 +308,7 @@ class TileConvolution:
         _add_products(tiles.numbers, rows, columns, self._symbols, self._waves, sums)
 
     def reached(self) -> NDArray[np.bool_]:
-        """Return which tiles of the grid are near one of these."""
+        """Return a mask of the tiles of the grid that are near one of these tiles."""
         reached = np.zeros(self.tiles.numbers.shape, np.bool_)
         for row, column in zip(self.tiles.rows.tolist(), self.tiles.columns.tolist(), strict=True):
             rows, columns = (slice(max(place - self._reach, 0), place + self._reach + 1) for place in (row, column))
@@ -333,8 +332,8 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
 
 
 def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally: Tally) -> TileConvolution:
-    """Return an operator from displacement to pressure between adjacent tiles, a preconditioner: the symbol `|q|/(1 -
-    nu)`, whose coefficients fall with the third power of the distance."""
+    """Return a preconditioner: an operator from displacement to pressure between adjacent tiles with the symbol `|q|/(1
+    - nu)`, whose coefficients fall with the third power of the distance."""
     length = 8 * SIDE
     qx, qy = (
         2.0 * np.pi * np.fft.fftfreq(length, each / count) for each, count in zip(size, tiles.points, strict=True)
@@ -381,8 +380,8 @@ GAUSS = 0.5 / math.sqrt(3.0)  # two-point Gauss rule over a cell
 class TileOperator:
     """Operator from pressure to displacement on tiles.
 
-    `near` has the coefficients of the first part at distances from 0 on along y and x; `nodes` computes the second
-    part.
+    `near` has the coefficients of the first part of the module, at distances along y and x from 0 up; `nodes` computes
+    the second part.
     """
 
     def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes", tally: Tally) -> None:
@@ -416,8 +415,8 @@ class TileOperator:
         return nodes
 
     def displace(self, field: Array, parts: list[slice], take: Callable[[int, Array], None]) -> None:
-        """Compute the displacement of the whole grid under a stacked map, and call `take(number, map)` for each part of
-        its rows, in their order."""
+        """Compute the displacement of the whole grid under a stacked map, and call `take(number, map)` for each of the
+        row ranges `parts`, in their order."""
         nodes = self._displace_nodes(field)
         self._near.transform(field)
         nx, _ = self._tiles.points
@@ -445,7 +444,7 @@ class TileOperator:
 
 
 class FreeNodes:
-    """Nodes of tiles of a free box; `smooth(x, y)` is the influence coefficient of a node."""
+    """Nodes of a regular grid for the tiles of a free box; `smooth(x, y)` is the influence coefficient of a node."""
 
     def __init__(
         self, tiles: Tiles, size: tuple[float, float], smooth: Callable[[Array, Array], Array], tally: Tally
@@ -461,7 +460,7 @@ class FreeNodes:
         self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
 
     def displace(self) -> None:
-        """Replace the loads in `map` by displacements."""
+        """Replace the loads of nodes in `map` by displacements."""
         self._far.apply(self.map, self.map)
 
 
@@ -492,7 +491,7 @@ def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, flo
 
 
 def step_of_nodes(tiles: Tiles) -> int:
-    """Return the distance of nodes in points, a divisor of SIDE."""
+    """Return the distance between nodes in points, a divisor of SIDE."""
     step = 4
     while step * NODES < max(tiles.points) and step < SIDE // FEWEST_NODES:
         step *= 2

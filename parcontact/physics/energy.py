@@ -1,10 +1,10 @@
-"""Energies and measured quantities of a step.
+"""Energies of the body, and measures of a step in SI units: load, tangential force, contact area, gaps.
 
-Energy balance of the body: work done on it, energy stored in it, and energy dissipated by its branches.
+Energies are the work done on the body, the energy stored in it, and the energy dissipated by its branches.
 
 With `<a, b>` the sum over points, branch k stores `<h_k, A^-1 h_k>/(2 G_k)` and dissipates `<h_k, A^-1 h_k>/(G_k
-tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All follow from products of `w = A^-1 du` of each
-step with existing maps.
+tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All energies follow from products of `w = A^-1 du`
+of each step with existing maps.
 
 The exponential integrators take u as linear or quadratic in time within a step (`physics.body`): work and
 dissipation are the exact integrals over this motion, and the balance closes up to rounding. With `0 <= s <= 1`, `z =
@@ -13,21 +13,19 @@ dt/tau` and the bend `c = kappa/2 (du - r du_before)`,
     u' = du + (2 s - 1) c,     h = exp(-z s) h_0 + G a du + G b c,                                                (1)
     a = (1 - exp(-z s))/z,     b = int_0^s exp(-z (s - x)) (2 x - 1) dx.
 
-The error of the motion itself appears in the difference of this work to that of the forces on the surface, the
-integral of `W dd - F ds`. Backward Euler defines no motion within a step: its work follows from the trapezoidal rule,
-its dissipation that at the end of the step, and the balance closes to first order in the time step.
-
-Measures of a step, in SI units: load, tangential force, contact area, gaps.
+The error of the assumed motion appears in the difference between this work and the work of the forces on the surface,
+the integral of `W dd - F ds`. Backward Euler defines no motion within a step: the work follows from the trapezoidal
+rule, the dissipated power is taken at the end of the step, and the balance closes to first order in the time step.
 
 Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length S
 of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx` (V.
 A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells this is
 `SIDE` for each side between a point in contact and one that is not, and less on long cells (`measures.excess_of`).
 
-This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, it ends at the hardness H, and a
-point on the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded.
-Where the pressure falls from H to 0 over a cell or more, the edge is as without yielding, although points on it may
-have neighbours that have yielded. The smaller excess of the two holds for both.
+This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, the pressure ends at the hardness
+H, and a point on the edge carries the share p/H of the hardness: the excess is `1 - p/H` of a cell, and 0 at points
+that have yielded. Where the pressure falls from H to 0 over a cell or more, the edge is as without yielding, although
+points on it may have neighbours that have yielded. The smaller excess of the two holds for both.
 """
 
 import math
@@ -57,8 +55,8 @@ NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.lege
 class EnergyMemory:
     """Memory of the energies of a body: sums since the start, in the unit of the scene; `dissipated` by branch.
 
-    A body with branches also needs `spring`, `<u, A^-1 u>`; `branches`, `<h_k, A^-1 h_k>`; and from the last
-    increment of u `increment`, `<du, A^-1 du>`, and `crossed`, `<h_k, A^-1 du>`. `elastic` is the memory of
+    A body with branches also needs the products `spring`: `<u, A^-1 u>`; `branches`: `<h_k, A^-1 h_k>`; and with the
+    last increment of u, `increment`: `<du, A^-1 du>` and `crossed`: `<h_k, A^-1 du>`. `elastic` is the memory of
     `ElasticPressure`, if used.
     """
 
@@ -73,7 +71,7 @@ class EnergyMemory:
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
         """Return the energies after a step without external work: the branches have dissipated the decrease of the
-        stored energy, in the shares that the integrator gives."""
+        stored energy, each by its share in the dissipation since `before`."""
         lost = self.dissipated - before.dissipated
         whole = float(lost.sum())
         share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
@@ -81,7 +79,7 @@ class EnergyMemory:
 
 
 class Pressed(NamedTuple):
-    """Pressure `modulus p` at an instant, with its map p."""
+    """Pressure `modulus p` at an instant, with the map p."""
 
     p: Array
     modulus: float
@@ -94,8 +92,9 @@ class Inverse(Protocol):
 
 
 class StepProducts(NamedTuple):
-    """Products of a branch and of the motion (1) in a step, or their weights in a sum: `S = <h_0, A^-1 h_0>/G`, `X =
-    <h_0, A^-1 du>`, `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>`, `F = G <c, A^-1 c>`."""
+    """Products of a branch with the motion (1) of the module in a step, or the weights of these products in a sum: `S =
+    <h_0, A^-1 h_0>/G`, `X = <h_0, A^-1 du>`, `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>`, `F = G
+    <c, A^-1 c>`."""
 
     s: Array
     x: Array
@@ -109,8 +108,8 @@ class StepProducts(NamedTuple):
 
 
 def dissipation_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the dissipation over a step `z = dt/tau`, the integral of `<h, A^-1 h>/(G
-    tau)`."""
+    """Return the weights of `StepProducts` in the energy dissipated in a step `z = dt/tau`, the integral of `<h, A^-1
+    h>/(G tau)`."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     lost, q = -np.expm1(-safe), bend(safe)
@@ -132,8 +131,8 @@ def dissipation_weights(z: Array) -> StepProducts:
 
 
 def bend_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the difference of the work over a step `z = dt/tau` to that of the
-    trapezoidal rule: the integral of `<h, A^-1 u'>` minus the mean of `<h, A^-1 du>` at both ends."""
+    """Return the weights of `StepProducts` in the work of a step `z = dt/tau` minus the work by the trapezoidal rule:
+    the integral of `<h, A^-1 u'>` minus the mean of `<h, A^-1 du>` at both ends."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     q = bend(z)
@@ -143,7 +142,8 @@ def bend_weights(z: Array) -> StepProducts:
 
 
 def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
-    """Return `exp(-z s)`, a and b of (1) at NODES, along an additional axis, for z up to SMALL."""
+    """Return `exp(-z s)`, a and b of (1) at the quadrature points s = NODES, along an additional axis, for z up to
+    SMALL."""
     x = z[..., None] * NODES
     change = NODES * (np.exp(-x[..., None] * NODES) @ WEIGHTS)
     later = 2.0 * NODES[:, None] * (1.0 - NODES) - 1.0  # 2 x - 1 at x = s - s y
@@ -151,7 +151,7 @@ def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies of a body without memory, which stores all work. `unit` [J] is the unit of all energies."""
+    """Energies of a body without memory, which stores all work; `unit` [J] is their unit."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -172,22 +172,24 @@ class ElasticEnergy:
         body: BodyMemory,
         growth: float = 0.0,
     ) -> EnergyMemory:
-        """Return the energies after a solve for a pressure and the displacement u; one reduction; collective."""
+        """Return the energies after a solve for the pressure `now` with the displacement u; one reduction;
+        collective."""
         stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
         return EnergyMemory(work=stored, stored=stored)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the stored energy. It is optional, as it follows from each contact."""
+        """Return the checkpoint entry of the stored energy, which is optional, as the energy follows from each
+        contact."""
         return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies of a checkpoint; the work is the stored energy."""
+        """Return the energies that a checkpoint holds; the work equals the stored energy."""
         stored = float(saved.get("stored", 0.0))
         return EnergyMemory(work=stored, stored=stored)
 
 
 class AppliedInverse:
-    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` returns a map that is free until the
+    """Computes `A^-1 du` by an operator K that is the inverse of A. `scratch()` returns a map that is free until the
     next solve."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
@@ -196,10 +198,10 @@ class AppliedInverse:
         self._inverse, self._scratch = inverse, scratch
 
     def at_rest(self) -> None:
-        """Return no memory."""
+        """Return None: there is no memory."""
 
     def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float) -> tuple[Array, None]:
-        """Return `A^-1 du`, and no memory; collective."""
+        """Return the map `A^-1 du` and None; collective."""
         return self._inverse.apply(du, self._scratch()), None
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
@@ -207,11 +209,12 @@ class AppliedInverse:
         return {}
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> None:
-        """Return no memory."""
+        """Return None: there is no memory."""
 
 
 class ElasticPressure:
-    """`v = A^-1 u` if the inverse of A is not available: the pressure that holds u on an elastic body of modulus 1.
+    """Computes `v = A^-1 u` if the inverse of A is not available: the pressure that causes u on an elastic body of
+    modulus 1.
 
     A acts on space and relaxation on time, so that they commute: with `h_k = A m_k` the law of the body,
 
@@ -231,27 +234,27 @@ class ElasticPressure:
     def advance(
         self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float
     ) -> tuple[Array, BodyMemory]:
-        """Return the increment of v in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after it,
-        in the maps of the one before; local to this rank."""
+        """Return the increment of v in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after the
+        step, in the maps of the memory before; local to this rank."""
         assert memory is not None
         v = surface_of(memory)
         now = self.body.commit(memory, self.body.begin(memory, dt, MovedHeights(v), growth), p, v)
         return now.increment, now
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
-        """Return the entries of the body, with strains instead of displacements."""
+        """Return the checkpoint entries of the second body, with strains instead of displacements."""
         assert memory is not None
         strain = units.height / units.length
         return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> BodyMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
         assert memory is not None
         return self.body.restored(memory, saved)
 
 
 class ZenerEnergy:
-    """Energies of a `ZenerBody`; `unit` [J] is the unit of all energies."""
+    """Energies of a `ZenerBody`; `unit` [J] is their unit."""
 
     def __init__(
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
@@ -276,7 +279,7 @@ class ZenerEnergy:
         growth: float = 0.0,
     ) -> EnergyMemory:
         """Return the energies after a step from the pressure `before` to `now`; `body` is the memory of the body after
-        it. One reduction; collective.
+        the step. One reduction; collective.
 
         `growth` is dt over the length of the step before (`physics.body`). The maps of an `elastic` memory are reused.
         """
@@ -308,7 +311,8 @@ class ZenerEnergy:
         return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, own, crossed, elastic)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the energies, the sums needed to continue them, and the memory of `ElasticPressure`."""
+        """Return the checkpoint entries: the energies, the sums needed to continue them, and the memory of
+        `ElasticPressure`."""
         spring = units.height**2 / units.length
         return {
             "work": Entry(memory.work, self.unit, "J"),
@@ -322,7 +326,7 @@ class ZenerEnergy:
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies of a checkpoint, whose maps have been read into `memory`."""
+        """Return the energies that a checkpoint holds, whose maps have been read into `memory`."""
         work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
         names = "dissipated", "branches", "crossed"
         dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)
@@ -349,7 +353,8 @@ class _Yielding(NamedTuple):
 
 @dataclass(frozen=True)
 class Probe:
-    """Computes measures from the maps of a solved step; pressures are bounded by the `hardness` [Pa]."""
+    """Computes measures from the maps of a solved step. `shears` are further friction of the contact area; pressures
+    end at the `hardness` [Pa], if given."""
 
     slab: Slab
     surface: Surface
@@ -378,8 +383,9 @@ class Probe:
         """Return the measures of the pressure `alpha p` with the gap `u - h - d`; collective.
 
         The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not 0
-        where the surfaces touch. Friction is 0 without a compressive load above `least_load` [N], the rounding of two
-        forces that balance. If nothing touches, all pressure is tension, and a load above 0 is an error of the solve.
+        where the surfaces touch. Friction is 0 unless the load is compressive and above `least_load` [N], the rounding
+        error of two balanced forces. If nothing touches, all pressure is tension, and a load above 0 is an error of the
+        solve.
         """
         units, points = self.units, self.slab.points
         along_x, along_y = self.surface.periodic

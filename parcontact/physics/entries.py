@@ -1,13 +1,10 @@
-"""Entries of checkpoints, and their units.
+"""Entries of checkpoints: what a part of a run remembers from one step to the next, and the units of a run.
 
-Entries of checkpoints: what a part of a run remembers from one step to the next, with units.
-
-Each part defines its first memory, the entries of a memory, and the memory from entries, for any number of ranks
+Each part defines its first memory, the entries of a memory, and the memory that entries give, for any number of ranks
 (`RunPart`); `march.state.parts_of` lists all parts.
 
-Units of a run, in which all its numbers are dimensionless, for any scale of lengths.
-
-All are powers of two: conversion is exact, and a checkpoint in SI units restarts bit for bit.
+In the units of a run all numbers are dimensionless. The units are powers of two: conversion is exact, and a checkpoint
+in SI units restarts bit for bit.
 """
 
 import math
@@ -25,7 +22,7 @@ def _power_of_two(value: float) -> float:
 
 @dataclass(frozen=True)
 class Units:
-    """Unit of heights and displacements [m], of lengths in the plane [m], and of moduli [Pa]."""
+    """Units of a run: of heights and displacements [m], of lengths in the plane [m], and of moduli [Pa]."""
 
     height: float
     length: float
@@ -39,7 +36,7 @@ class Units:
 
     @property
     def pressure(self) -> float:
-        """Unit of pressures [Pa], which moves the half space by `height` over `length`."""
+        """Unit of pressures [Pa], `modulus height/length`."""
         return self.modulus * self.height / self.length
 
 
@@ -49,10 +46,11 @@ Memory = TypeVar("Memory")
 
 @dataclass(frozen=True)
 class Entry:
-    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers; `unit` is the SI value of 1.
+    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers. Multiply by `unit` for SI
+    units.
 
-    A checkpoint may lack an `optional` entry, for which `restored` has a value. A `given` entry follows from the
-    job: it is not restored, and a checkpoint with another value is refused.
+    A checkpoint may lack an `optional` entry, which `restored` then replaces. A `given` entry follows from the job: it
+    is not restored, and a checkpoint with another value is refused.
     """
 
     value: NDArray[Any] | float
@@ -67,12 +65,12 @@ class Entry:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the part of this rank."""
+        """Bytes of this rank's part of the entry."""
         return np.asarray(self.value).nbytes
 
 
 class RunPart(Protocol[Memory]):
-    """A part of a run with a memory from one step to the next.
+    """A part of a run that has a memory from one step to the next.
 
     The memory is a value: a step returns a new one. Two memories may share maps (`march.state`).
     """
@@ -81,19 +79,19 @@ class RunPart(Protocol[Memory]):
         """Return the memory before the first step, in new maps."""
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the entries of a memory by the part's own names; maps are not copied."""
+        """Return the checkpoint entries of a memory by the part's own names; maps are not copied."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`; numbers are arrays in
-        the run's units."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`; numbers are arrays in the
+        run's units."""
 
 
 def with_part(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:
-    """Return the entries of a part by their names in a checkpoint."""
+    """Return the entries of a part under their full names `part/name` in a checkpoint."""
     return {f"{part}/{name}": entry for name, entry in entries.items()}
 
 
 def part_of(part: str, saved: Saved) -> Saved:
-    """Return the entries of a part in a checkpoint, by the part's own names."""
+    """Return the entries of one part of a checkpoint, by the part's own names."""
     head = f"{part}/"
     return {name.removeprefix(head): value for name, value in saved.items() if name.startswith(head)}

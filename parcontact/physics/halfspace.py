@@ -1,41 +1,38 @@
-"""Operators of a half space and of a layer.
-
-The half space, or a layer: operators between pressure and normal displacement of the surface, at rest and in
+"""Operators of a half space and of a layer, between pressure and normal displacement of the surface, at rest and in
 sliding.
 
 An elastic half space of shear modulus 1 under the pressure p moves by the Boussinesq integral (paper, Eq. 1)
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
-For a modulus G divide by G. Lengths have any unit: displacements are in this unit times pressure over modulus. The
-kernel `spectral` uses this symbol; `love` takes the pressure as constant on each cell (`physics.love`) and the
-displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. A layer on a
-rigid base (`physics.halfspace`) multiplies the symbol by its compliance ratio.
+For a modulus G divide by G. Lengths have any unit; the unit of displacements is this unit times pressure/modulus. The
+kernel `spectral` uses this symbol; the kernel `love` takes the pressure as constant on each cell (`physics.love`) and
+the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. A layer on a
+rigid base multiplies the symbol by its compliance ratio S.
 
 A pressure wave `exp(i q x)` that moves with the surface at the velocity v loads a point of a viscoelastic body at
 the angular frequency `-q v`, so that in the frame of the surface
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
-The wake of an isolated contact is not periodic: its influence coefficients are integrals along it (`physics.love`).
+The wake of an isolated contact is not periodic: influence coefficients are integrals along the wake (`physics.love`).
 
-A layer on a rigid base: the ratio of the displacement of its surface to that of a half space.
-
-A layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave of the wavenumber q by
+The surface of a layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave of the
+wavenumber q by
 
     u^(q) = (1 - nu)/q S(q d) p^(q).
 
-If it is bonded to the base, with kappa = 3 - 4 nu,
+If the layer is bonded to the base, with kappa = 3 - 4 nu,
 
     S(x) = (kappa sinh 2x - 2x) / (kappa cosh 2x + 2x^2 + 5 - 12 nu + 8 nu^2),
 
-and on a smooth base, along which it slides freely,
+and if it slides freely along a smooth base,
 
     S(x) = (cosh 2x - 1) / (sinh 2x + 2x).
 
-A uniform pressure p strains it in one direction only, and moves it by `p d (1 - 2 nu)/(2 (1 - nu))`: an
-incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms
-(1951); for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
+A uniform pressure p strains the layer in one direction only, and moves its surface by `p d (1 - 2 nu)/(2 (1 - nu))`: an
+incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms (1951);
+for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 """
 
 import math
@@ -84,8 +81,10 @@ SERIES_BELOW = 1.0  # accuracy: y below which sinh(y) - y is a series, exact to 
 
 @dataclass(frozen=True)
 class LongWaves:
-    """Compliance `c0 + c2 q^2` that corrects a preconditioner in which long waves on a layer are as soft as its softest
-    wave, in a box of `size`; lengths have one unit."""
+    """Compliance `c0 + c2 q^2` of long waves on a layer, in a box of `size`; lengths have one unit.
+
+    It corrects a preconditioner in which these waves are as soft as the layer's softest wave.
+    """
 
     c0: float
     c2: float
@@ -102,7 +101,7 @@ class Layer:
     poisson: float = 0.5
 
     def compliance_ratio(self, q: Array) -> Array:
-        """Return S(q d) for wavenumbers q > 0; 0 for q = 0."""
+        """Return the compliance ratio S(q d) of the module for wavenumbers q > 0; 0 for q = 0."""
         x = np.asarray(q * self.thickness, dtype=float)
         y, decay = 2.0 * x, np.exp(-2.0 * x)  # both are multiplied by 2 exp(-y) against overflow
         sinh, cosh = -np.expm1(-2.0 * y), 1.0 + decay**2
@@ -119,15 +118,15 @@ class Layer:
 
     @property
     def mean_compliance(self) -> float:
-        """Displacement over a uniform pressure."""
+        """Displacement per unit of uniform pressure."""
         return self.thickness * (1.0 - 2.0 * self.poisson) / (2.0 * (1.0 - self.poisson))
 
     @cached_property
     def softest_wave(self) -> tuple[float, float]:
-        """Wavenumber at which the layer is softest, and pressure over displacement there.
+        """Wavenumber of the wave for which the layer is softest, and this wave's pressure divided by displacement.
 
-        A compressible layer is softest for the longest waves; an incompressible bonded one for waves about four
-        times as long as its thickness, as longer ones must push it along its base.
+        A compressible layer is softest for the longest waves; an incompressible bonded layer for waves about four times
+        as long as the thickness, as longer waves must push the layer along its base.
         """
         q = np.geomspace(*SOFTEST_BETWEEN, SOFTEST_TRIED) / self.thickness
         stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
@@ -135,11 +134,11 @@ class Layer:
         return float(q[softest]), float(stiffness[softest])
 
     def long_waves(self, size: tuple[float, float]) -> LongWaves | None:
-        """Return the compliance by which longer waves in a box are stiffer than the softest one; None if they are
+        """Return the compliance of waves in a box that are longer and stiffer than the softest wave; None if they are
         hardly stiffer, or do not exist.
 
         The compliance of long waves on a bonded layer is `mean_compliance` plus, to second order in q, `d^3 ((3 - 4
-        nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible one.
+        nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible layer.
         """
         nu, softest, stiffness = self.poisson, *self.softest_wave
         least = stiffness * self.mean_compliance
@@ -153,8 +152,8 @@ class Layer:
         """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.
 
         `of_half_space` has the displacements of a half space (Love's). The difference is smooth on the scale of the
-        thickness: `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond
-        FAR it is cut off.
+        thickness: `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond FAR
+        the difference is taken as 0.
         """
         correction = self._correction()
         mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))
@@ -197,11 +196,11 @@ UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as 
 class HalfSpace:
     """A half space of shear modulus 1, loaded inside a box of `size = (lx, ly)` [any unit of length].
 
-    With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
-    periodic along x only (`physics.love`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
-    methods are transforms of maps; operators compute in their precision, and symbols have their shape, or the shape
-    of the requested rows. A free half space makes its own padded transform for each operator. `factors` multiply the
-    storage and the loss modulus of waves in steady sliding, by wavenumber; None for a linear body.
+    If `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is periodic
+    along x only (`physics.love`). Otherwise the box is periodic, with the `kernel`. The argument `fft` of methods is
+    the transform of maps: operators compute in its precision, and symbols have its shape, or the shape of the requested
+    rows. A free half space makes a padded transform for each operator. `factors` multiply the storage and the loss
+    modulus of waves in steady sliding, by wavenumber; None for a linear body.
     """
 
     size: Vector
@@ -228,15 +227,15 @@ class HalfSpace:
 
     @property
     def long_waves(self) -> LongWaves | None:
-        """Compliance of waves longer than the softest wave of a layer, for a preconditioner; None without
-        such waves."""
+        """Compliance of waves longer than the softest wave of a layer, for a preconditioner; None without such
+        waves."""
         return None if self.layer is None else self.layer.long_waves(self.size)
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`. A mean pressure moves
-        layers only."""
+        """Return the ratio of displacement to pressure of each wave of a periodic body, `(1 - nu)/|q|` on a half space.
+        A mean pressure moves only layers."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         symbol = self.compliance(q)
         if self.layer is not None:
@@ -244,18 +243,18 @@ class HalfSpace:
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
     def compliance(self, q: Array) -> Array:
-        """Return displacement over pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
+        """Return the ratio of displacement to pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
         with np.errstate(divide="ignore"):
             found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
         return found if self.layer is None else found * self.layer.compliance_ratio(q)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return pressure over displacement of each wave, `|q|/(1 - nu)`, without the kernel.
+        """Return the ratio of pressure to displacement of each wave, `|q|/(1 - nu)` on a half space, without the
+        kernel.
 
-        At q = 0, where a periodic half space has no inverse, it has the value of the smallest wavenumber, which
-        keeps it positive. Waves on a layer that are longer than its softest one get the stiffness of this one: they
-        would join patches of contact. Their higher stiffness within patches is left to
-        `contact.preconditioner`.
+        At q = 0, where a periodic half space has no inverse, the ratio is the value of the smallest wavenumber, which
+        keeps it positive. Waves on a layer that are longer than the softest wave get the stiffness of the softest wave:
+        they would join patches of contact. `contact.preconditioner` accounts for their higher stiffness within patches.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
@@ -280,12 +279,12 @@ class HalfSpace:
 
     @property
     def largest_compliance(self) -> float:
-        """Displacement over pressure of a wave as long as the box."""
+        """Ratio of displacement to pressure of a wave as long as the box."""
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Return the lengths of the padded transform of an operator on `points`; None if it uses the transform of the
-        maps."""
+        """Return the lengths of an operator's padded transform for maps with `points`; None if the operator uses the
+        transform of the maps."""
         if not self.free:
             return None
         lengths = padded_lengths(*points)
@@ -294,9 +293,9 @@ class HalfSpace:
     def operator(self, fft: FFT) -> Convolution:
         """Return the operator from pressure to displacement; collective where the half space is free.
 
-        A free box is padded with zeros to twice its size, which makes the cyclic convolution with Love's
-        coefficients a linear one (paper, reference [12]). The coefficients are computed at the first use, the
-        transforms are planned at once.
+        A free box is padded with zeros to twice its size, which makes the cyclic convolution with Love's coefficients a
+        linear one (paper, reference [12]). The coefficients are computed at the first use; the transforms are planned
+        at once.
         """
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
@@ -320,9 +319,9 @@ class HalfSpace:
     def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
         """Return the operator from displacement to pressure.
 
-        It is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and for a
-        layer, it is a preconditioner. The one of a free box continues displacements mirrored at its edges, so that they
-        have no jump there.
+        The operator is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and
+        for a layer, it is a preconditioner. In a free box displacements are continued mirrored at the edges, so that
+        they have no jump there.
         """
         if self.free and not self.repeats_along_x:
             cosines = Cosines(fft)
@@ -330,14 +329,14 @@ class HalfSpace:
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Return whether there are operators on tiles: on a half space in a free box with cells that are not long."""
+        """Return True if operators on tiles exist: for a half space in a free box whose cells are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
         return (
             self.free and not self.repeats_along_x and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
         )
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
-        """Return the operator of a free half space on tiles of its grid, and a preconditioner."""
+        """Return the operator of a free half space on tiles of its grid, and a preconditioner for it."""
         operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
@@ -346,9 +345,9 @@ class HalfSpace:
     def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
         """Return the operators of the gap solver; collective where the half space is free.
 
-        These are pressure to displacement; its inverse, 0 for mean values; the displacement over a uniform pressure;
-        and the factor, always positive, by which the first operator multiplies mean values. A free body is replaced
-        by a periodic one with the same influence coefficients up to half the box.
+        The first operator takes pressure to displacement, and the second is its inverse, 0 for mean values. Two numbers
+        follow: the displacement per unit of uniform pressure, and a factor for mean values that is always positive. A
+        free body is replaced by a periodic one with the same influence coefficients up to half the box.
         """
         if self.free:
             table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
@@ -371,17 +370,18 @@ class HalfSpace:
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 
     def frequencies(self, fft: FFT, velocity: Vector, rows: slice = ALL) -> Array:
-        """Return the angular frequency `q v` of each wave under a surface of this velocity [length/s]; shape
-        `fft.shape`. A Nyquist wavenumber counts as 0."""
+        """Return the angular frequency `q v` of each wave under a surface that slides at this velocity [length/s],
+        shape `fft.shape`. Nyquist wavenumbers count as 0."""
         qx, qy = travelling_wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
-        """Return a function that gives G*(-q v) of each wave of rows, times `factors`; at a Nyquist wavenumber, which
-        has two signs, the mean of both.
+        """Return a function of rows that returns the moduli G*(-q v) of their waves, times `factors`; at a Nyquist
+        wavenumber, which has two signs, the mean of both.
 
-        Its result broadcasts to the rows: under a surface that slides along x all rows are equal without factors, and
-        made once."""
+        The moduli broadcast to the rows: without factors all rows are equal under a surface that slides along x, and
+        one is made.
+        """
         if velocity[1]:
             return lambda rows: self._with_factors(fft, self._linear_modulus(fft, velocity, prony, rows), rows)
         of_a_row = self._linear_modulus(fft, velocity, prony, slice(0, 1))
@@ -417,7 +417,7 @@ class HalfSpace:
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
-        """Return the operator from displacement to pressure, as `inverse`."""
+        """Return the operator from displacement to pressure of a viscoelastic body in sliding; see `inverse`."""
         moduli = self.sliding_moduli(fft, velocity, prony)
 
         def part(rows: slice) -> Spectrum:
@@ -428,8 +428,8 @@ class HalfSpace:
     def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
         """Return the operator from pressure to the map h_k of branch k of a free body; collective.
 
-        In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has the poles of the creep function only:
-        each of its terms is weighted by the response of the branch at the rate -1/l_i of this term.
+        In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has the poles of the creep function only: each
+        term i of the creep function is weighted by the response of the branch at the rate -1/l_i.
         """
         creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
         ratio = -tau / creep.retardation_times

@@ -1,9 +1,7 @@
-"""Fused loops over the rows of this rank, for the body and the surface. Heights are a map and a cyclic
-offset along x.
+"""Fused loops over the rows of this rank, for the body and the surface, and the lowest waves of a transform.
 
-The lowest waves of a transform. A smooth surface has no others, so that only these are stored.
-
-They are the first rows of a spectrum, q_y >= 0, the last rows, q_y < 0, and the first columns.
+Heights are a map and a cyclic offset along x. A smooth surface has only low waves, so that only these are stored. They
+are the first rows of a spectrum, q_y >= 0, the last rows, q_y < 0, and the first columns.
 """
 
 import numpy as np
@@ -15,7 +13,7 @@ from ..parallel.fft import FFT, Spectrum
 
 @loop
 def copy_shifted(row, start, out):
-    """`out(i) = row(i - start)`, cyclic; `start` is at least 0 and below the length."""
+    """Put `row(i - start)`, cyclic, into `out`; `start` is at least 0 and below the length."""
     rest = row.size - start
     for i in range(rest):
         out[start + i] = row[i]
@@ -35,7 +33,7 @@ def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, 
     """Advance the branches, `h_k <- decay_k h_k + gain_k du + back_k buffer`, and put the next effective heights into
     `buffer`: `heights(i - offset) + sum weight_k h_k - weight_u u + weight_du du`.
 
-    Four branches at once use the memory bandwidth better than one after the other.
+    Loops over four branches at once use the memory bandwidth better than loops over one branch each.
     """
     count, ny, nx = branches.shape
     start = offset % nx
@@ -122,13 +120,12 @@ def sum_measures(p, u, h, mask, above, cyclic):
 
 @loop
 def measure_yielded(p, u, h, above, below, cyclic, highest):
-    """Return sums over the points of this rank for a contact whose pressures end at `highest`, where points have
-    yielded.
+    """Return sums over the points of this rank for a contact in which pressures end at `highest`, where points yield.
 
-    They are the excess cells if edges at yielded points are sharp, `sum 1 - p/highest` over points between one that has
-    yielded and one without pressure; the sides between other points below `highest` and points without pressure; the
-    number of points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of
-    this rank.
+    The four sums are: the excess cells if edges at yielded points are sharp, `sum 1 - p/highest` over points between a
+    yielded point and a point without pressure; the number of sides between other points below `highest` and points
+    without pressure; the number of yielded points, and their sum of `u - h`. `above` and `below` are the rows of p
+    before and after the rows of this rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0
@@ -153,8 +150,8 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
 
 @loop
 def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
-    """Return sums over every `stride`-th row, from `first` on: of p, p e^2, p u^2, p (difference of h on both sides)^2,
-    p h, p h^2 and p increment^2, with `e = sum decay_k h_k + gain increment + past before` and h = `heights(i -
+    """Return the sums of p, p e^2, p u^2, p (difference of h on both sides)^2, p h, p h^2 and p increment^2 over every
+    `stride`-th row, from row `first`, with `e = sum decay_k h_k + gain increment + past before` and h = `heights(i -
     offset)`.
 
     Points without pressure are skipped; each run of points with pressure is summed on its own.
@@ -261,7 +258,7 @@ def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
 
 @loop
 def displace(h, rows, along_x, along_y, out):
-    """Put the spectrum of moved heights into `out`: `along_x along_y h` with the phases of the shift on the `rows` and
+    """Put the spectrum of moved heights into `out`: `along_x along_y h` with the phases of the shift in the `rows` and
     first columns of h, 0 elsewhere."""
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
@@ -274,13 +271,14 @@ def displace(h, rows, along_x, along_y, out):
 
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
-    """Advance all waves of heat, put the spectrum of the temperature into `out`, and store the present sources. Return
-    the sum of the temperature at depth times the pressure (`effects.heat.solver`), without the mean.
+    """Advance all waves of heat by a step dt, put the spectrum of the temperature into `out`, and store the present
+    sources.
 
-    `known` has rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared
-    wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and
-    pressure, each before and after the step. `out` may be one of the `sources`; spectra without rubbing have no row.
-    `heats` has the heat of both at the two ends of the step.
+    Return the sum of the temperature at depth times the pressure (`effects.heat.solver`), without the mean. `known` has
+    rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared wavenumbers times the
+    diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and pressure, each before and after
+    the step. `out` may be one of the `sources`; spectra without rubbing have no row. `heats` has the heat of both
+    sources at the two ends of the step.
     """
     rates, weights, deep, fall, end = known
     spread_x, spread_y, multiplicity = spread
@@ -326,17 +324,18 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
 
 
 def shape_of(waves: tuple[int, int], lengths: tuple[int, int], columns: slice) -> tuple[int, int]:
-    """Return the shape of the lowest waves on a rank: at most `waves` in the box along x and y, in its columns."""
+    """Return the shape of this rank's part of the lowest waves: at most `waves` in the box along x and y, in its
+    `columns`."""
     count = min(waves[0], lengths[0] // 2) + 1
     return min(2 * waves[1] + 1, lengths[1]), max(0, min(count, columns.stop) - columns.start)
 
 
 def rows_of(count: int, my: int) -> NDArray[np.int64]:
-    """Return the numbers of the lowest `count` rows of a spectrum of `my` rows."""
+    """Return the indices of the rows with the lowest `count` wavenumbers in a spectrum of `my` rows."""
     return np.concatenate([np.arange((count + 1) // 2), np.arange(my - count // 2, my)])
 
 
 def lowest(spectrum: Spectrum, fft: FFT, waves: tuple[int, int]) -> Spectrum:
-    """Return this rank's part of the lowest waves, a copy in the precision of the transform."""
+    """Return this rank's part of the lowest waves of a spectrum, copied in the precision of the transform."""
     rows, columns = shape_of(waves, (fft.mx, fft.my), fft.columns)
     return np.ascontiguousarray(spectrum[rows_of(rows, fft.my), :columns], fft.complex)

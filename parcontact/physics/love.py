@@ -1,30 +1,27 @@
-"""Influence coefficients of isolated contacts.
+"""Influence coefficients of isolated contacts, of boxes periodic along x, and of sliding contacts with their wake.
 
-Love's coefficients: the displacement of the half space under a pressure that is constant on one cell.
+Love's coefficients are the displacement of the half space under a pressure that is constant on one cell.
 
 For a shear modulus of 1 (A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2)
 
     A(x, y) = (1 - nu)/(2 pi) int_cell dx' dy' / sqrt((x - x')^2 + (y - y')^2).
 
-Influence coefficients of a half space on which a box is periodic along x and free along y.
-
-The displacement under a unit pressure on one cell and its images, at the distances m Lx along x, is for a shear
-modulus of 1 (`love`: one cell, with the integral I of 1/r)
+A box that is periodic along x and free along y has images of each cell at the distances m Lx. With the integral I of
+1/r over one cell, the displacement under a unit pressure on the cell and its images is, for a shear modulus of 1,
 
     A(x, y) = (1 - nu)/(2 pi) sum_m I(x + m Lx, y).
 
-The sum diverges: a load that does not vary along x is one of plane strain, and moves the surface by the logarithm of
-the distance across (K. L. Johnson, Contact Mechanics, 1985, Sec. 2.2). Displacements are relative to those of such a
-load at the distance Ly, the width of the box:
+The sum diverges: a load that does not vary along x causes plane strain, and moves the surface by the logarithm of the
+distance y (K. L. Johnson, Contact Mechanics, 1985, Sec. 2.2). Displacements are therefore relative to the displacement
+of such a load at the distance Ly, the width of the box:
 
     A = (1 - nu)/pi (dx dy/Lx) ln(Ly/|y|)    for |y| >> Lx.
 
-So each load within the box moves every point of it downwards, and pressures do positive work. Under a prescribed
-load pressures and gaps do not depend on this choice; the approach does.
+So each load within the box moves every point of the box downwards, and pressures do positive work. Under a prescribed
+load this choice changes only the approach, not pressures and gaps.
 
-Influence coefficients of an isolated sliding contact, including the wake of the surface in the body.
-
-At the velocity v a body point that is now at x was at `x + v t` a time t ago. With the creep function
+In an isolated contact that slides at the velocity v, a body point that is now at x was at `x + v t` a time t ago. With
+the creep function
 
     J(t) = J_g + sum J_i (1 - exp(-t/l_i)),
 
@@ -58,7 +55,8 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
     """Return the integral of 1/r over a `dx x dy` cell at distance (x, y).
 
     Near the cell, these are differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. Far
-    away they cancel: there the integral is in closed form along the nearer direction and numerical along the other.
+    away these differences lose digits: there the integral is in closed form along the nearer direction and numerical
+    along the other.
     """
     x, y = abs(x), abs(y)
     if x * dy < y * dx:
@@ -86,7 +84,8 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
 
 
 def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array:
-    """Return the compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
+    """Return the compliance for cell-constant pressure divided by the compliance for a sampled wave, for each
+    wavenumber; to 14 digits.
 
     `size` is the size of the box, `rows` are rows of a spectrum. A wave of cell-constant pressures contains all aliases
     of its wavenumber, each with the form factor of the cell: `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) /
@@ -134,7 +133,7 @@ GAUSS = 0.5 / np.sqrt(3.0)  # nodes of two points over a cell [cells]
 
 def strip_coefficients(x: Array, y: Array, dx: float, dy: float, *, size: tuple[float, float], poisson: float) -> Array:
     """Return the displacement [length] at (x, y) from the centre of a `dx x dy` cell and its images, under a unit
-    pressure on each of them, for G = 1; |x| <= lx/2 for the box of `size = (lx, ly)`."""
+    pressure on the cell and each image, for G = 1; |x| <= lx/2 for the box of `size = (lx, ly)`."""
     total = sum(np.asarray(over_cell(x + m * size[0], y, dx, dy)) for m in range(-NEAREST, NEAREST + 1))
     nodes = [(a * GAUSS * dx, b * GAUSS * dy) for a in (-1, 1) for b in (-1, 1)]
     rest = sum(_far_images(x + a, y + b, size) for a, b in nodes) / len(nodes)
@@ -164,7 +163,7 @@ DECAYED = 40.0  # accuracy: distance over creep length at which integrals end, e
 
 
 def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: CreepSpectrum) -> Array:
-    """Return K(x, y) above for a `dx x dy` cell under unit pressure, nu = 1/2; shapes broadcast."""
+    """Return K(x, y) of the module for a `dx x dy` cell under unit pressure, with nu = 1/2; x and y broadcast."""
     speed = float(np.hypot(*velocity))
     lengths = speed * creep.retardation_times
     short = lengths <= LOCAL * min(dx, dy)

@@ -1,6 +1,5 @@
-"""Measures of one instant of a contact, and the certificate of a solve. This module imports no other of the package, so
-that tables are read quickly.
-"""
+"""Measures of one instant of a contact, and the certificate of a solve. To be read quickly, the module imports no
+other."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,22 +10,23 @@ SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per si
 
 
 def excess_of(dx: float, dy: float, edges_follow_grid: bool = False) -> float:
-    """Return the excess of the counted contact area, in cells, per cell side on its edge, for cells of sides dx and dy.
+    """Return by how many cells the counted contact area is too large, per cell side on the edge of contact.
 
-    On squares it is SIDE. On long cells it is smaller, as edges of contact run rather along the longer sides: SIDE
-    times the ratio of sides to the power LONG_CELLS. It is SIDE if `edges_follow_grid`.
+    The excess is SIDE on square cells, and if `edges_follow_grid`. On long cells it is smaller, as edges of contact run
+    rather along the longer sides: SIDE times (shorter/longer of dx and dy) to the power LONG_CELLS.
     """
     return SIDE if edges_follow_grid else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 
 
 @dataclass(frozen=True)
 class Measures:
-    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; areas are shares of the nominal area.
+    """Measures of a contact at one instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; areas are
+    shares of the nominal area.
 
     `contact_area` counts the points with pressure. `contact_area_corrected` subtracts the excess along edges of
-    contact. It holds on average over edges in all directions that are smooth on the scale of a cell: spheres, and
-    rough surfaces whose shortest wave has at least 4 cells. The edge of the box is not an edge of contact. `spared`
-    is the share that is not subtracted because points on the edge have yielded. `at_edge`: an isolated contact
+    contact. The correction holds on average for edges in all directions that are smooth on the scale of a cell:
+    spheres, and rough surfaces whose shortest wave has at least 4 cells. The edge of the box is not an edge of contact.
+    `spared` is the share that is not subtracted because points on the edge have yielded. `at_edge`: an isolated contact
     reaches the edge of the box. Forces and `friction` include the interface, whose part is `force_interface` and
     `friction_interface`. Friction is 0 without a compressive load.
     """
@@ -52,15 +52,15 @@ class Measures:
 
     @property
     def friction_x(self) -> float:
-        """Tangential over normal force along x, `-force_x/normal force`, positive where it opposes motion along +x; 0
-        at zero load."""
+        """Tangential force along x divided by normal force, `-force_x/normal force`, positive where it opposes motion
+        along +x; 0 at zero load."""
         force = math.hypot(self.force_x, self.force_y)
         return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Errors of a returned pressure, all computed from it and without unit.
+    """Errors of a returned pressure, computed from this pressure alone and without unit.
 
     * complementarity: `sum(p |g|)/(L sum(p))`;
     * penetration: `max(-g, 0)/L` over all points;
@@ -71,7 +71,7 @@ class Certificate:
         L^2 = <p, u^2>/<p> - (<p, u>/<p>)^2,
 
     at least LEAST_SHARE of the mean `<p, u>/<p>`, for contacts of one or two points, and at most the height of the
-    surface. It does not depend on the size of the box. In steady sliding along lines of points, waves that do not vary
+    surface. L does not depend on the size of the box. In steady sliding along lines of points, waves that do not vary
     along the lines may have a far lower modulus, and most of the displacement (`contact.certificate.Lines`).
     """
 
@@ -87,6 +87,6 @@ class Certificate:
         return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
 
     def shortened(self, share: float) -> "Certificate":
-        """Return the certificate with gaps over `share` times the length."""
+        """Return the certificate for gaps divided by `share` times the length."""
         gaps = self.complementarity / share, self.penetration / share
         return replace(self, complementarity=gaps[0], penetration=gaps[1], length=share * self.length)

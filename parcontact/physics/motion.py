@@ -4,24 +4,26 @@ Position of the rigid surface: `h(x, t) = h0(x - s(t))`, with s its displacement
 
 Tangential force of a pressure on the surface of the body, `-<p, du/ds>`, the second estimate of friction.
 
-In the continuum it equals the force on the rigid surface, `-<p, dh/ds>` (paper, Eq. 10), as the gap and its slope
-vanish under pressure. On a mesh the difference of the two measures the mesh error of friction. On an elastic body
-the second is exactly 0, as the operator A is symmetric and any antisymmetric difference along s commutes with it.
+In the continuum this force equals the force on the rigid surface, `-<p, dh/ds>` (paper, Eq. 10), as the gap and its
+slope vanish under pressure. On a mesh the difference of both forces measures the mesh error of friction. On an elastic
+body the force on the body is exactly 0, as the operator A is symmetric and any antisymmetric difference along s
+commutes with it.
 
 Slopes are differences of the eighth order,
 
     du/dx = sum_k c_k (u(x + k dx) - u(x - k dx))/dx,      c = 4/5, -1/5, 4/105, -1/280,
 
-with an error of 0.03 % for a wave of 8 cells and 3 % for a wave of 4. Unlike the slope of a Fourier series they need
-only points near the contact, in periodic and in free boxes.
+with an error of 0.03 % for a wave of 8 cells and 3 % for a wave of 4. Unlike slopes of a Fourier series, these
+differences need only points near the contact, in periodic and in free boxes.
 
-Friction of the contact area itself: a shear stress that opposes sliding on all points in contact.
+Friction of the contact area itself is a shear stress that opposes sliding on all points in contact:
 
     F = -tau A v/|v|,    tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2),
 
-a bell in the logarithm of the velocity with its maximum at v_0, which shifts with temperature like the bulk (B. Lorenz,
-Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear does not
-move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a coupled solve.
+a bell-shaped function of the logarithm of the velocity with its maximum at v_0, shifted by temperature like the bulk
+(B. Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear
+does not move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a coupled
+solve.
 """
 
 import math
@@ -42,7 +44,7 @@ PARTS = 10**9  # accuracy: positions are rounded to this fraction of a cell
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
-    """Return by how many cells, along x and y, the surface moves from one displacement [m] to another."""
+    """Return the numbers of cells, along x and y, by which the surface moves between two displacements [m]."""
     return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
 
 
@@ -52,7 +54,7 @@ def are_whole(cells: Vector) -> bool:
 
 
 class Motion(Protocol):
-    """Heights of the surface at a displacement [m]; collective."""
+    """Motion of the surface, which returns its heights at a displacement [m]; collective."""
 
     def at(self, displacement: tuple[float, float]) -> MovedHeights: ...
 
@@ -76,7 +78,7 @@ class AnyFraction:
 class AlongX:
     """Motion along x on a periodic box, by whole cells or (PARTS) by parts of a cell.
 
-    Whole cells are an index offset; the map is computed again when the fraction of a cell has changed.
+    Motion by whole cells is an index offset; the map is computed again when the fraction of a cell has changed.
     """
 
     def __init__(self, surface: Surface, parts: int = 1) -> None:
@@ -100,8 +102,9 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 def friction_by_energy(
     slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: tuple[bool, bool]
 ) -> float:
-    """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective. The result is in the unit of `u`
-    over that of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or rows continue beyond the edge."""
+    """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective. The unit of the result is the
+    unit of `u` divided by the unit of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or rows continue
+    beyond the edge."""
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
         nothing = np.empty((0, slab.nx), u.dtype)
@@ -158,7 +161,7 @@ def _sums(p, u, above, below, along_x, along_y, cyclic):
 
 
 class Shear(Protocol):
-    """Friction of the contact area itself, in addition to that of the body."""
+    """Friction of the contact area itself, in addition to the friction of the body."""
 
     def force(self, area: float, velocity: Vector) -> Vector:
         """Return the force [N] on the rigid surface that slides with `velocity` [m/s] on an area in contact [m^2]."""
@@ -169,8 +172,8 @@ class Shear(Protocol):
 
 @dataclass(frozen=True)
 class InterfaceFriction:
-    """`shear_stress` [Pa], the largest one; of a bell its `velocity` [m/s] and `width` [decades], and the shift factor
-    a_T."""
+    """Shear stress of the contact area: `shear_stress` [Pa] is its largest value. A bell has its maximum at `velocity`
+    [m/s], its `width` [decades], and the shift factor a_T (`shift`)."""
 
     shear_stress: float
     velocity: float | None = None

@@ -6,19 +6,19 @@ Source: J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapters 1 and 
 paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". Relaxation times may be
 0 (no stress after the first instant) or infinite (a spring).
 
-Memory of heat as a sum of exponentials: each wave of heat on the surface decays like the branches of a body.
+The memory of heat is a sum of exponentials, too: each wave of heat on the surface decays like the branches of a body.
 
 Heat of the wavenumber k on the surface, released a time t ago, leaves the temperature `exp(-D k^2 t)/(e sqrt(pi
 t))`, in the Laplace domain `1/(e sqrt(s + D k^2))`, with the effusivity e. With
 
     1/sqrt(pi t) = 2/pi int_0^inf exp(-m^2 t) dm ~ sum_j w_j exp(-m_j^2 t),   m_j = m_0 exp(j h),  w_j = 2/pi h m_j  (1)
 
-the memory has one map for each j, which decays at the rate `m_j^2 + D k^2`. Each m belongs to a wave along the
-depth, of wavenumber m/sqrt(D), and heat at depth enters it with the cosine transform of its distribution. The
+the memory has one map for each j, which decays at the rate `m_j^2 + D k^2`. Each m belongs to a wave along the depth,
+of wavenumber m/sqrt(D), whose share in heat at depth is the cosine transform of the heat's distribution. The
 trapezoidal rule (1) in ln m has the relative error `2 sum_n 1/sqrt(cosh(pi^2 n/h))` at every t, as the Fourier
-transform of the integrand is a gamma function (G. Beylkin, L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131).
-All waves below m_0 are combined to one with their mean rate, correct to second order in `m_0^2 t`; above the last
-wave `erfc(m sqrt(t))` is left out.
+transform of the integrand is a gamma function (G. Beylkin, L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131). All
+waves below m_0 are combined to one wave with their mean rate, correct to second order in `m_0^2 t`; above the last wave
+`erfc(m sqrt(t))` is neglected.
 """
 
 import math
@@ -47,7 +47,8 @@ class Prony(NamedTuple):
 
 
 class CreepSpectrum(NamedTuple):
-    """J(t) = glass + sum_i compliances[i] (1 - exp(-t/retardation_times[i])) + fluidity t, in 1/Pa, s and 1/(Pa s)."""
+    """Creep function J(t) = glass + sum_i compliances[i] (1 - exp(-t/retardation_times[i])) + fluidity t, in 1/Pa, s
+    and 1/(Pa s)."""
 
     glass: float
     compliances: Array
@@ -79,8 +80,8 @@ class CreepSpectrum(NamedTuple):
 
 
 def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Prony:
-    """Return the same series with ascending, distinct, positive and finite relaxation times and positive moduli. Raises
-    ValueError for numbers that do not define a relaxation function."""
+    """Return a series equal to this one with ascending, distinct, positive, finite relaxation times and positive
+    moduli. Raises ValueError for numbers that do not define a relaxation function."""
     terms, times = np.atleast_1d(np.asarray(moduli, float)), np.atleast_1d(np.asarray(relaxation_times, float))
     if terms.shape != times.shape or terms.ndim != 1:
         raise ValueError(f"There are {terms.size} moduli but {times.size} relaxation times.")
@@ -181,8 +182,8 @@ class Advance(NamedTuple):
 def coefficients(prony: Prony, integrator: str, dt: float, growth: float = 0.0) -> Advance:
     """Return the coefficients of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes.
 
-    `growth` is dt over the length of the step before, 0 if the displacement was not smooth: with it the exponential
-    integrator takes u as quadratic in time (`physics.body`), else as linear.
+    `growth` is dt divided by the length of the step before, 0 if the displacement was not smooth. With `growth` > 0 the
+    exponential integrator takes u as quadratic in time (`physics.body`), else as linear.
     """
     z = elapsed(prony, dt)
     if integrator == "backward-euler":
@@ -206,9 +207,10 @@ def bend(z: ArrayLike) -> Array:
 def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
     """Return the creep compliance of a relaxation function, by partial fractions of 1/Gbar.
 
-    Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, one lambda_i above every relaxation
-    time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. The unknown of each zero is
-    the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times are.
+    Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, with one lambda_i above every
+    relaxation time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. Each zero is
+    found by the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the
+    times are.
     """
     series = normal_form(*material)
     spring, terms, times = series
@@ -235,8 +237,8 @@ class Zero(NamedTuple):
 
 
 def retardation(series: Prony) -> list[Zero]:
-    """Return the zeros of a series in normal form, one above each relaxation time; without a spring the last is
-    infinite and left out."""
+    """Return the zeros of a series in normal form, one above each relaxation time; if the series has no spring, the
+    last zero is infinite and omitted."""
     return [_zero_above(index, series) for index in range(series.moduli.size - (series.modulus_inf == 0))]
 
 
@@ -279,10 +281,10 @@ INSTANT = 30.0  # accuracy: m above which a wave has no memory, over 1/sqrt(shor
 
 @dataclass(frozen=True)
 class Exponentials:
-    """The sum (1) for times from `shortest` to `longest` [s], with a relative error of at most `bound`.
+    """The sum of exponentials (1) for times from `shortest` to `longest` [s], with a relative error of at most `bound`.
 
-    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` have a memory; the
-    others follow the present heat. Waves above `end` [s^(-1/2)] are left out. `first` and `spacing` are m_0 and h.
+    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` have a memory; the others
+    follow the present heat. Waves above `end` [s^(-1/2)] are neglected. `first` and `spacing` are m_0 and h.
     """
 
     rates: slab_Array
@@ -295,7 +297,8 @@ class Exponentials:
 
 
 def fit_exponentials(shortest: float, longest: float, error: float) -> Exponentials:
-    """Return the sum for times from `shortest` to `longest` [s] with a relative error of at most `error` < 1/10."""
+    """Return the sum of exponentials for times from `shortest` to `longest` [s] with a relative error of at most
+    `error` < 1/10."""
     h = np.pi**2 / (2.0 * np.log(4.0 * np.sqrt(2.0) / error))  # half of the error
     below = np.exp(-h * np.arange(1.0, 40.0 / h))  # m/m_0 of the waves below m_0, which are combined
     share, rate = below.sum(), (below**3).sum() / below.sum()
@@ -313,7 +316,8 @@ def fit_exponentials(shortest: float, longest: float, error: float) -> Exponenti
 
 
 def shares_of_step(x: slab_Array) -> tuple[slab_Array, slab_Array]:
-    """Return the weights of the heat before and after a step `x = rate dt`, over dt, for heat linear in time."""
+    """Return the weights, per unit of dt, of the heat before and after a step `x = rate dt`, for heat linear in
+    time."""
     small = np.minimum(x, 1e-3)
     safe = np.maximum(x, 1e-3)
     mean = np.where(x < 1e-3, 1.0 - small / 2 + small**2 / 6 - small**3 / 24, -np.expm1(-safe) / safe)

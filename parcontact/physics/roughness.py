@@ -3,8 +3,10 @@
     Phi(k) = C                             long-wavelength end <= k < roll-off
              C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
 
-with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from a stream that depends on the seed
-and its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole."""
+with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from a stream that depends on the seed and
+its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole
+spectrum.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,10 +26,10 @@ EDGE = 1.0 - 1e-9  # accuracy: factor on limits of wavenumbers, against rounding
 
 @dataclass(frozen=True)
 class Roughness:
-    """Parameters of a random surface; lengths in m. One of rms slope, rms height and spectral constant is given.
+    """Parameters of a random surface; lengths in m. One of rms slope, rms height and spectral constant C is given.
 
-    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves
-    along the angle are longer by this ratio than waves across it.
+    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves along
+    the angle are longer by this ratio than waves across.
     """
 
     hurst: float
@@ -53,8 +55,8 @@ class Roughness:
         return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
 
     def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
-        """Return this rank's part of the transform of the heights [m] on a box of `size` [m]; collective. Raises
-        InputError if no wave of the box lies within the limits."""
+        """Return this rank's part of the Fourier transform of random heights [m] on a box of `size` [m]; collective.
+        Raises InputError if no wave of the box lies within the limits."""
         kx, ky = wavenumbers(fft, size)
         k, (ratio, angle) = np.hypot(kx, ky), self.stretch
         along, across = kx * np.cos(angle) + ky * np.sin(angle), ky * np.cos(angle) - kx * np.sin(angle)
@@ -109,7 +111,7 @@ def _alternating(last: int) -> Array:
 
 @dataclass(frozen=True)
 class Moments:
-    """Spectral moments of an isotropic surface and what follows from them (SI)."""
+    """Spectral moments of an isotropic surface, and parameters that follow from them (SI units)."""
 
     m0: float
     m2: float
@@ -121,7 +123,7 @@ class Moments:
 
     @property
     def rms_slope(self) -> float:
-        """Rms length of the gradient."""
+        """Rms magnitude of the gradient."""
         return float(np.sqrt(2.0 * self.m2))
 
     @property
@@ -131,8 +133,8 @@ class Moments:
 
 
 def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
-    """Return m0 = <h^2>, m2 = <|grad h|^2>/2 and m4 = (3/8) <(laplace h)^2> of a map given by its transform or, if
-    there are no others, by its lowest waves; collective."""
+    """Return m0 = <h^2>, m2 = <|grad h|^2>/2 and m4 = (3/8) <(laplace h)^2> of a map from its transform; collective.
+    The lowest waves suffice if the map has no others."""
     q, power = _powers(spectrum, fft, size)
     q2 = q**2
     m0, m2, m4 = fft.slab.sum(*(float(np.sum(power * weight)) for weight in (1.0, q2 / 2, 3 * q2**2 / 8)))
@@ -140,8 +142,8 @@ def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
 
 
 def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> float:
-    """Return the wavelength [m] below which waves contribute at most BEYOND of the mean square slope, of a map given as
-    for `moments`; infinite for a flat map. Collective."""
+    """Return the wavelength [m] below which waves contribute at most BEYOND of the mean square slope; infinite for a
+    flat map. Arguments are as in `moments`. Collective."""
     q, power = _powers(spectrum, fft, size)
     low = 2 * np.pi / max(size)
     highest = np.pi * np.hypot(fft.mx / size[0], fft.my / size[1])

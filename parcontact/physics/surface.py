@@ -1,14 +1,9 @@
-"""The rigid surface: shapes, roughness and statistics.
+"""The rigid surface: heights at any position, and the tangential force of a pressure on it.
 
-Heights of the rigid surface at any position, and the tangential force of a pressure on it.
-
-Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase
-`exp(-i q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is
-taken as a standing wave. Shapes in closed form are evaluated at each position. Every move starts from the original.
-
-Smooth shapes in closed form, evaluated at any position of the surface.
-
-Heights from a file: each rank reads its own rows.
+Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase `exp(-i
+q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is taken as a
+standing wave. Shapes in closed form are evaluated at each position. Each motion is applied to the heights at the
+origin.
 """
 
 import math
@@ -78,7 +73,7 @@ class Conical:
 @dataclass(frozen=True)
 class Pyramidal:
     """A square pyramid with its tip (0) at the centre and sides along x and y; on its edges the slope is the mean of
-    both faces."""
+    the slopes of both faces."""
 
     steepness: float
     centre: tuple[float, float]
@@ -93,7 +88,8 @@ class Pyramidal:
 
 @dataclass(frozen=True)
 class FlatEnded:
-    """A round punch: a flat face (0) of a radius, and around it a parabola with the radius of curvature `edge`."""
+    """A round punch: a flat face (height 0) with a `radius`, and around it a parabola with the radius of curvature
+    `edge`."""
 
     radius: float
     edge: float
@@ -111,8 +107,8 @@ class FlatEnded:
 
 @dataclass(frozen=True)
 class Round:
-    """A sphere, or a cylinder along x or y, with its highest point (0) at the centre; the profile is parabolic or
-    exact."""
+    """A sphere, or a cylinder along x or y, with its highest point (height 0) at the centre; the profile is parabolic,
+    or circular if `exact`."""
 
     radius: float
     centre: tuple[float, float]
@@ -163,7 +159,7 @@ class Surface:
         self.scale = 1.0 / unit
 
     def level(self) -> None:
-        """Make heights relative to the mean of the waves, as a large constant costs digits; collective."""
+        """Shift the datum of heights to the mean of the waves, as a large constant costs digits; collective."""
         if self.waves is not None:
             owner = self.fft.columns.start == 0 < self.fft.columns.stop
             mean = self.slab.sum(float(self.waves[0, 0].real) if owner else 0.0)[0] / (self.fft.mx * self.fft.my)
@@ -185,8 +181,8 @@ class Surface:
         return out
 
     def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
-        """Return the sums over all points of pressure times slope along x and y; collective. This is Eq. 10 of the
-        paper over the area of a cell; slopes are in the unit of heights over m."""
+        """Return the sums over all points of pressure times slope along x and y; collective. These are the forces of
+        Eq. 10 of the paper divided by the area of a cell; slopes are in the unit of heights per m."""
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)
@@ -273,7 +269,7 @@ Values = NDArray[Any]  # of any type, as in the file
 
 
 def read_heights(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
-    """Return the rows of this rank of a map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
+    """Return this rank's rows of a map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
 
     Raises InputError on every rank if a rank cannot read its rows, the shape differs, or a value is not a finite
     real number.

@@ -24,11 +24,11 @@ FLAT, STEEP = -2.0, -4.2  # physics: slopes of log C2 for Hurst exponents 0, and
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics of a periodic map of (ny, nx) points on (lx, ly) [m].
+    """Statistics of a periodic map of (ny, nx) points on a box of (lx, ly) [m].
 
-    Rms height [m], slope [-], and curvature [1/m], half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m],
-    with `psd_2d` [m^4]; spectra along x and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`. `hurst` with the standard error
-    `hurst_error` is NaN if no power law fits.
+    Rms height [m], slope [-], and curvature [1/m], which is half of the Laplacian; Nayak's parameter; `q`, shape (n,)
+    [1/m], with `psd_2d` [m^4]; spectra along x and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`. `hurst` with the standard
+    error `hurst_error` is NaN if no power law fits.
     """
 
     rms_height: float
@@ -46,7 +46,7 @@ class Statistics:
 
 
 def surface_statistics(heights: Array, size: tuple[float, float]) -> Statistics:
-    """Return the statistics of a map, from its Fourier series."""
+    """Return the statistics of a map of heights [m] on a box of `size` [m], from its Fourier series."""
     ny, nx = heights.shape
     power = np.abs(fft.fft2(heights - heights.mean()) / (nx * ny)) ** 2
     qx, qy = (2 * np.pi * fft.fftfreq(n, length / n) for n, length in zip((nx, ny), size, strict=True))
