@@ -131,8 +131,11 @@ def _load_error(job: Job, stage: Stage, cycle: Mapping[str, Array], phase: float
 
 
 def _step_error(job: Job, stage: Stage, dt: Array) -> float:
-    """Return the relative error of the loss of a harmonic load or approach with steps of these lengths [s]."""
+    """Return the relative error of the loss of a harmonic load or approach with steps of these lengths [s]; 1 where
+    nothing can be lost."""
     omega, series = 2.0 * math.pi * stage.frequency, relaxation_of(job.material)
+    if not job.remembers:
+        return 1.0
     if not series.moduli.size:
         return 0.0
     true = complex_modulus(np.array([omega]), *series)
@@ -162,14 +165,23 @@ def describe_cycles(job: Job, columns: Columns) -> Iterator[str]:
 def _describe_stages(job: Job, found: Sequence[Cycle]) -> Iterator[str]:
     for index, stage in enumerate(job.history):
         if own := [cycle for cycle in found if cycle.stage == index]:
-            yield _describe(stage, own, job.numerics.asked.of_steps)
+            yield _describe(job, stage, own)
 
 
-def _describe(stage: Stage, cycles: Sequence[Cycle], accuracy: float) -> str:
+def describe_loss(loss: float, error: float) -> str:
+    """Return a loss [J] with its relative error; a loss that is smaller than its error is 0 with an error in J."""
+    if error > 1.0:
+        return f"0 ± {quantity(error * abs(loss), 'J', 2)}"
+    return f"{quantity(loss, 'J', 4)} ± {stated_error(error)}"
+
+
+def _describe(job: Job, stage: Stage, cycles: Sequence[Cycle]) -> str:
     """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
-    last, lag = cycles[-1], math.degrees(cycles[-1].phase)
-    lost = f"{quantity(last.loss, 'J', 4)} ± {stated_error(last.error_loss)}, phase {lag:.3g} degrees"
-    said = f"{stage.name}: loss of cycle {last.cycle} {lost}"
+    last, accuracy = cycles[-1], job.numerics.asked.of_steps
+    said = f"{stage.name}: loss of cycle {last.cycle} {describe_loss(last.loss, last.error_loss)}"
+    if last.error_loss > 1.0:
+        return f"{said}: {'it is smaller than its error' if job.remembers else 'an elastic body loses nothing'}"
+    said += f", phase {math.degrees(last.phase):.3g} degrees"
     if len(cycles) == 1:
         return f"{said}; a second cycle would show whether cycles repeat"
     change = abs(last.loss - cycles[-2].loss) / abs(last.loss) if last.loss else 0.0

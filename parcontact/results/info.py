@@ -27,7 +27,7 @@ from ..job import Job
 from ..job.listing import answers
 from ..job.reading import CASES
 from ..parallel.slab import Slab
-from ..printed import quantity, stated_error, with_error
+from ..printed import quantity, with_error
 from . import cycles, slide, theory_table
 from .results import KINDS, PLACES, Results, describe_end, read_cases, swept_keys
 
@@ -311,7 +311,7 @@ def _headline_of_run(directory: Path) -> str:
     for headline in answers("results", "headline"):
         parts += headline(run)
     if last := cycles.measure_last(job, columns):
-        parts.append(f"the last cycle loses {quantity(last['loss'], 'J')} ± {stated_error(last['error_loss'])}")
+        parts.append(f"the last cycle loses {cycles.describe_loss(last['loss'], last['error_loss'])}")
     return _to_sentence([*parts, _area(job, run)])
 
 

@@ -1,6 +1,7 @@
 """Cycles of loads and motion: loss, amplitude and phase against closed forms, and against a fine history of ramps."""
 
 import math
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -172,6 +173,10 @@ def test_what_is_said_of_the_last_two_cycles(tmp_path: Path) -> None:
     assert "a second cycle would show" in said[0]
     assert "the last two cycles differ by" in said[1]
     assert (tmp_path / "cycles.csv").read_text().count("\n") == 3
+    elastic = {"model": "elastic", "shear_modulus": MODULUS}
+    job = Job.model_validate({**ball(12), "material": elastic, "history": [force(FREQUENCY, 2)]})
+    found = list(write_cycles(tmp_path, job, table(marched(job)[1])))
+    assert re.fullmatch(r"stage 1: loss of cycle 2 0 ± [0-9.]+ .?J: an elastic body loses nothing", found[0])
 
 
 @pytest.mark.parametrize(
