@@ -295,7 +295,7 @@ class Effect(Protocol[Memory]):
     section: ClassVar[type[Part]]  # section that it adds to a job
     columns: ClassVar[tuple[str, ...]]  # columns that it adds to measures.csv
     fields: ClassVar[tuple[str, ...]] = ()  # maps that effects of this package add to those of output.fields
-    in_bands_over_time: ClassVar[bool] = False  # True for classes that jobs in bands with a history may have
+    in_bands_over_time: ClassVar[bool] = False  # True for classes of jobs in bands with a history, or with a rule on it
     in_curves: ClassVar[bool] = False  # True for classes that act in friction curves
     brings_law: ClassVar[bool] = False  # True for classes with a `law`; they exclude steady sliding
     forbids: ClassVar[Mapping[str, str]] = {}  # what is not done with it (EXTRAPOLATION, SINGLE, ...), with reasons

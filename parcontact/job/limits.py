@@ -248,11 +248,19 @@ def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 def loads_are_borne(
-    grid: Grid, material: AnyMaterial, history: tuple[Stage | None, ...], initial: Initial, steady: Steady | None
+    grid: Grid,
+    material: AnyMaterial,
+    history: tuple[Stage | None, ...],
+    initial: Initial,
+    steady: Steady | None,
+    bands: Any,
 ) -> Iterator[Fault]:
-    """Check that mean pressures are below the hardness, and that there is no steady sliding with a hardness."""
+    """Check that mean pressures are below the hardness, and that there are no bands and no steady sliding with it."""
     hardness = material.hardness
     if hardness is None:
+        return
+    if bands is not None:
+        yield Fault("cannot be used with bands: their closing has no largest pressure", ("material", "hardness"))
         return
     for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if given:

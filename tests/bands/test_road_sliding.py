@@ -211,6 +211,20 @@ def test_what_does_not_go_with_bands(changes: dict[str, object], sentence: str) 
     assert "on cells of" not in str(found.value)  # a job in bands has no grid
 
 
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion cannot be used with bands: they are coupled"),
+        ({"material": {**JOB["material"], "hardness": 1e7}}, "material.hardness cannot be used with bands"),
+    ],
+)
+def test_what_no_history_in_bands_has_is_one_mistake(changes: dict[str, object], sentence: str) -> None:
+    history = [{"pressure": 1e5}, {"pressure": 1e5, "velocity": 1.0, "distance": 1e-3}]
+    with pytest.raises(JobError, match=re.escape(sentence)) as found:
+        jobs.load({**JOB, "bands": "auto", "steady": None, "history": history, **changes})
+    assert len(found.value.mistakes) == 1
+
+
 def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Points that are there are not solved again; lines of bands.csv without their point in steady.csv, and a line that
     was not finished, are replaced."""

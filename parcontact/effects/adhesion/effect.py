@@ -140,6 +140,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
+    in_bands_over_time: ClassVar[bool] = True  # `_no_bands` refuses them
     rules: ClassVar[tuple[Rule, ...]] = rules_of(_bodies, _zone_is_resolved, _no_bands, _no_strip)
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
     forbids: ClassVar[Mapping[str, str]] = {
