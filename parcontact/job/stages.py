@@ -320,6 +320,16 @@ class Stage(Part):
         lasts = moves or data.keys() & {*LASTS}
         return {**data, "time_step": AUTO} if lasts and not given else data
 
+    @classmethod
+    def _instead(cls, word: str) -> Instead:
+        """Return advice for an unknown word, also for a key that an effect adds to the stages of its jobs."""
+        from . import listing  # which needs this module
+
+        for section, effect in listing.find_effects().items():
+            if hasattr(effect, "stage") and word in effect.stage.model_fields.keys() - cls.model_fields.keys():
+                return Instead(f"it needs a section {section}")
+        return super()._instead(word)
+
     @property
     def chooses(self) -> bool:
         """Return True for `time_step: auto`."""

@@ -240,7 +240,7 @@ REFUSED: Json = {
         **total(1.0, 0.0),
     },
     "history.0.fluid_pressures needs leakage": {"history": [RAMP], "leakage": {}},
-    "history.0.fluid_pressures is not a known key": {"history": [RAMP]},
+    "history.0.fluid_pressures is not a known key; it needs a section leakage": {"history": [RAMP]},
     "output.fields includes fluid_pressure": {"output": {"fields": "fluid_pressure"}},
     "cannot be used with adhesion": {"adhesion": {"work": 0.05}, **total(1.0, 0.0)},
 }
