@@ -5,7 +5,8 @@ columns stand there, too (`stated`). Other rooms
 find what its further modules offer by `offers`, and so name no capability. `GIVES` and `USES` name what an effect finds
 in a step for others, and what it needs of others: effects that give something follow a step before those that use it.
 With `MATERIAL = True` the section is a material, which may include a file. `CHANGES_STEPS` names the keys that change
-steps which a run has completed, if these are not all keys of the section."""
+steps which a run has completed, if these are not all keys of the section. `STAGE_KEYS` are the keys that a section adds
+to stages."""
 
 from collections.abc import Collection, Mapping
 from functools import cache

@@ -21,6 +21,7 @@ from pydantic import (
     create_model,
 )
 
+from .. import capabilities
 from .calculation import Celsius
 from .parts import Instead, Origin, Part, Rule, rules_of
 from .quantities import Count, Flag, Positive, Real, Vector, along_x, listed, log_range
@@ -323,12 +324,9 @@ class Stage(Part):
     @classmethod
     def _instead(cls, word: str) -> Instead:
         """Return advice for an unknown word, also for a key that an effect adds to the stages of its jobs."""
-        from . import listing  # which needs this module
-
-        for section, effect in listing.find_effects().items():
-            if hasattr(effect, "stage") and word in effect.stage.model_fields.keys() - cls.model_fields.keys():
-                return Instead(f"it needs a section {section}")
-        return super()._instead(word)
+        adds = (each.SECTION for each in capabilities.folders() if word in getattr(each, "STAGE_KEYS", ()))
+        section = next(adds, "")
+        return Instead(f"it needs a section {section}") if section else super()._instead(word)
 
     @property
     def chooses(self) -> bool:

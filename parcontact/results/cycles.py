@@ -168,7 +168,7 @@ def _describe_stages(job: Job, found: Sequence[Cycle]) -> Iterator[str]:
             yield _describe(job, stage, own)
 
 
-def describe_loss(loss: float, error: float) -> str:
+def loss_with_error(loss: float, error: float) -> str:
     """Return a loss [J] with its relative error; a loss that is smaller than its error is 0 with an error in J."""
     if error > 1.0:
         return f"0 ± {quantity(error * abs(loss), 'J', 2)}"
@@ -178,7 +178,7 @@ def describe_loss(loss: float, error: float) -> str:
 def _describe(job: Job, stage: Stage, cycles: Sequence[Cycle]) -> str:
     """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
     last, accuracy = cycles[-1], job.numerics.asked.of_steps
-    said = f"{stage.name}: loss of cycle {last.cycle} {describe_loss(last.loss, last.error_loss)}"
+    said = f"{stage.name}: loss of cycle {last.cycle} {loss_with_error(last.loss, last.error_loss)}"
     if last.error_loss > 1.0:
         return f"{said}: {'it is smaller than its error' if job.remembers else 'an elastic body loses nothing'}"
     said += f", phase {math.degrees(last.phase):.3g} degrees"

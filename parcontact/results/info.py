@@ -311,7 +311,7 @@ def _headline_of_run(directory: Path) -> str:
     for headline in answers("results", "headline"):
         parts += headline(run)
     if last := cycles.measure_last(job, columns):
-        parts.append(f"the last cycle loses {cycles.describe_loss(last['loss'], last['error_loss'])}")
+        parts.append(f"the last cycle loses {cycles.loss_with_error(last['loss'], last['error_loss'])}")
     return _to_sentence([*parts, _area(job, run)])
 
 

@@ -3,6 +3,7 @@
 from ...column import COUNTED, Column, Table
 
 SECTION, EFFECT = "leakage", "LeakageColumns"
+STAGE_KEYS = ("fluid_pressures",)
 CHANGES_STEPS = tuple(f"leakage.{key}" for key in ("load", "pressures", "ambient", "fluid"))  # see `capabilities`
 
 
