@@ -1,16 +1,12 @@
-"""A band of the spectrum and its ladder of pressures.
+"""A band of the spectrum on its own grid, and its ladder: the mean pressures at which the band is solved.
 
-One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures.
-
-Ladders of pressures, and distributions of pressure as weights of their rungs.
-
-A result f(p) of a band is known at the rungs p_j of a ladder. Between them f(p)/p is the cubic in log p through the
-four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`; below the first and above the last rung it is constant. A
-distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
+Each pressure p_j of a ladder is a rung. A result f(p) of a band is known at the rungs. Between them f(p)/p is the cubic
+in log p through the four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`; below the first and above the last rung
+it is constant. A distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
 
     int P(p) f(p) dp = sum_j W_j f(p_j),    sum_j W_j p_j = int P(p) p dp:
 
-the load is conserved. Functions linear in p would conserve it, too, but underestimate a concave f.
+the load is conserved. Functions linear in p would conserve the load, too, but underestimate a concave f.
 """
 
 from __future__ import annotations
@@ -54,14 +50,14 @@ BELOW = 4.5  # accuracy: first rung below the mean, over the rms pressure, near 
 
 @dataclass(frozen=True)
 class PressureLadder:
-    """Rungs: rising pressures [Pa], shape (n,)."""
+    """The pressures at which a band is solved, its `rungs`: rising [Pa], shape (n,)."""
 
     rungs: Array
 
     @classmethod
     def over(cls, mean: float, rms: float) -> PressureLadder:
-        """Return the ladder for pressures of this mean and rms deviation in full contact [Pa], equally spaced in the
-        logarithm; one rung without deviation."""
+        """Return the ladder for pressures with this mean and rms deviation in full contact [Pa], equally spaced in the
+        logarithm; a single rung if the deviation is 0."""
         if not rms > 0.0:
             return cls(np.array([mean]))
         top = mean + ABOVE * rms
@@ -70,7 +66,8 @@ class PressureLadder:
         return cls(np.geomspace(bottom, top, count))
 
     def weights_of_rungs(self, pressures: Array) -> tuple[Array, float]:
-        """Return the weights of rungs for a map of pressures [Pa], and the share of the load above the last rung."""
+        """Return the weights W_j of the rungs for a map of pressures [Pa], and the share of the load above all
+        rungs."""
         p, rungs = pressures[pressures > 0.0], self.rungs
         count = len(rungs)
         if count == 1 or not p.size:
@@ -94,12 +91,12 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Rung:
-    """Steady state of one band under a mean `pressure` [Pa].
+    """Steady state of one band under a mean `pressure` [Pa] of its ladder.
 
-    Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
-    `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
-    the share of the load above them; power [W/m^2] lost in each branch; arrays that effects `found` (`Probe`), by their
-    names; relative errors of friction and area by solver and grid; residual, and operator calls.
+    Friction [-] of the band's waves, from the dissipated power and by slopes; area as a share, counted and corrected;
+    approach [m] (in `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the ladder of the next
+    finer band, and the share of the load above this ladder; power [W/m^2] lost in each branch; arrays that effects
+    `found` (`Probe`), by name; relative errors of friction and area by solver and grid; residual; operator calls.
     """
 
     pressure: float
@@ -123,26 +120,28 @@ Means = Mapping[str, Callable[[Any], Array]]  # weights of rungs in the mean of 
 
 
 class Probe(Protocol):
-    """Probe by which an effect measures each contact of a band. Its methods are local.
+    """Measures of an effect in each contact of a band. All methods are local.
 
-    A module `bands` of a capability has a function `probes` of a job and its bands (`choice.Cut`)."""
+    The function `probes(job, cut)` in the module `bands` of an effect yields them for the bands of a job
+    (`choice.Cut`).
+    """
 
     means: ClassVar[Means]
 
     def slide(self, setup: Setup, velocity: Vector) -> None:
-        """Prepare for a velocity [m/s]."""
+        """Prepare for contacts that slide at a velocity [m/s]."""
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> Mapping[str, Array]:
-        """Return the arrays of a contact by their names."""
+        """Return the arrays measured in a contact, by name."""
 
 
 def probes_of(job: Job, cut: Cut) -> list[Probe]:
-    """Return new probes of all effects of a job."""
+    """Return new measures of all effects of a job."""
     return [probe for made in answers("bands", "probes") for probe in made(job, cut)]
 
 
 class Band:
-    """A surface with the waves of one band, on this rank alone.
+    """A surface with the waves of one band, and its contacts, on this rank alone.
 
     `number` counts bands from the coarsest; each `sample` is another surface with the same spectrum. All waves have
     the amplitude of the spectrum, so that surfaces differ in their phases only.
@@ -193,11 +192,11 @@ class Band:
 
     @property
     def full_contact_rms(self) -> float:
-        """Rms pressure [Pa] of its waves in full contact."""
+        """Rms pressure [Pa] of the band's waves in full contact."""
         return self._full * self.setup.units.pressure
 
     def contact(self, pressure: float, law: Constraint) -> Contact:
-        """Return the contact in steady sliding under a mean pressure [Pa]; see `solve`."""
+        """Return the contact in steady sliding under a mean pressure [Pa], with the `law` of `solve`."""
         setup, units = self.setup, self.setup.units
         judge = Judge(setup.slab, setup.height / units.height)
         tolerance = tolerance_of(setup.choices.numerics.tolerance)
@@ -209,8 +208,9 @@ class Band:
         return contact
 
     def solve(self, pressure: float, law: Constraint, below: PressureLadder | None) -> Rung:
-        """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
-        distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
+        """Return the steady state under a mean pressure [Pa] and its distribution over `below`, the ladder of the next
+        finer band. `law` is the closing of all finer bands, a length [m] as a function of the pressure [Pa]. Raises
+        RunError if no state is found."""
         setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
         units = setup.units
         seen = contact.u, self.heights, contact.d, law.touches(contact.p)
@@ -240,7 +240,7 @@ class Band:
 
 
 def rung_errors(budget: ErrorBudget | None) -> Array:
-    """Return the errors of a rung from the budget of its contact."""
+    """Return the relative errors of friction and area by solver and grid, from the error budget of a contact."""
     both = (budget.friction, budget.area) if budget else (None, None)
     return np.array([(p.solver + p.folded, p.time, p.mesh) if p else (0.0, 0.0, 0.0) for p in both]).ravel()
 
@@ -279,6 +279,6 @@ def _seed(job: Job, number: int, sample: int) -> int:
 
 
 def direction_of(velocity: Vector) -> Vector:
-    """Return the direction of a velocity."""
+    """Return the unit vector along a velocity."""
     speed = math.hypot(*velocity)
     return velocity[0] / speed, velocity[1] / speed

@@ -13,7 +13,7 @@ from .road_history import RoadHistory
 
 
 def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
-    """Yield lines on the bands of a job and the time of its points or marches; collective, all ranks must take every
+    """Yield lines on the bands of a job and on the time of its points or marches; collective: all ranks must take every
     line."""
     if job.history:
         yield from _plan_history(job, slab)

@@ -1,9 +1,10 @@
 """Time steps of one band: each stage of a job becomes stages whose steps follow the cell and the waves of the band.
 
-After a change of velocity the steps of a slide grow from a small part of a cell to half a cell. After SETTLED of its
-longest waves a band slides steadily, and it is not marched until the next stage: fine bands settle within micrometres.
-So the times of a band's own history are shorter than those of the job, and a step is placed by its stage of the job and
-by the time since this stage began."""
+After a change of velocity the steps of a slide grow from a small part of a cell to half a cell. After a slip of SETTLED
+longest waves a band slides steadily, and makes no steps until the next stage: fine bands settle within micrometres. So
+a band's own history is shorter than the job's, and a step is placed by the number of the job's stage and by the time
+since this stage began.
+"""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -23,14 +24,14 @@ OF_FASTEST = 0.1  # accuracy: the same over the shortest relaxation time, if tha
 
 
 class Place(NamedTuple):
-    """An instant of a history: the number of the stage, and the time since the stage began [s]."""
+    """An instant of a job's history: the number of the stage, and the time since the stage began [s]."""
 
     stage: int
     elapsed: float
 
 
 def parts_of_history(job: Job, grid: Grid, longest: float) -> list[tuple[Stage, int]]:
-    """Return the stages of a band with this grid and `longest` wave [m], each with the number of its stage of the
+    """Return the stages of a band with this grid and `longest` wave [m], each with the number of its stage in the
     job."""
     found = list[tuple[Stage, int]]()
     for number, stage in enumerate(job.history):
@@ -53,7 +54,7 @@ def _parts(job: Job, stage: Stage, cell: float, longest: float) -> Iterator[Stag
 
 
 def rest_step(job: Job, stage: Stage) -> float:
-    """Return the first step [s] of a stage at rest."""
+    """Return the length [s] of the first step of a stage at rest."""
     times = relaxation_of(job.material)[2]
     return min(max(OF_REST * stage.seconds, OF_FASTEST * float(min(times, default=0.0))), stage.seconds / 4.0)
 
@@ -65,7 +66,7 @@ def _timed(stage: Stage, seconds: float, first: float, growth: float) -> Stage:
 
 
 class BandClock:
-    """Places of the steps of a band, whose own job has the stages `parts` (`parts_of_history`)."""
+    """Finds the place of a band's steps in the job's history; `parts` is the result of `parts_of_history`."""
 
     def __init__(self, job: Job, parts: list[tuple[Stage, int]]) -> None:
         timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
@@ -85,8 +86,8 @@ class BandClock:
     def between(self, at: Place) -> tuple[int, int, float]:
         """Return the numbers of the steps before and after a place, and the share of the step after.
 
-        Results vary linearly with the slip of a slide, and with the logarithm of the time of a rest.
-        Beyond the last step of a stage they are constant; before the first one they are those of the stage before.
+        Results vary linearly with the slip of a slide, and with the logarithm of the time of a rest. Beyond the last
+        step of a stage results are constant; before the first step they are the last ones of the stage before.
         """
         own = [index for index, place in enumerate(self.places) if place.stage == at.stage]
         after = next((index for index in own if self.places[index].elapsed >= at.elapsed), own[-1])

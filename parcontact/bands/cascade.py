@@ -1,9 +1,8 @@
-"""The passes over all bands, and the contacts that they keep.
+"""The upward and the downward pass over all bands, and the stored contacts.
 
-The upward pass, from the finest band to the coarsest, and the downward pass back.
-
-Upward each band is solved on the rungs of its ladder, with the closing of all finer bands as the law of its interface;
-its own approach is the law of the next coarser one. Downward the distribution of pressure passes through the bands,
+Upward, from the finest band to the coarsest, each band is solved at the pressures of its ladder, with the closing of
+all finer bands as the law of its interface; its approach as a function of the pressure is the law of the next coarser
+band. Downward the distribution of pressure passes through the bands,
 
     P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) w_j(p) dp,
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
@@ -11,11 +10,12 @@ its own approach is the law of the next coarser one. Downward the distribution o
 with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure within
 it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks solve different ones.
 
-Contacts of the point that is being solved, also in a file, so that a killed run continues within this point.
+Contacts of the present point of a friction curve are stored in a file, so that a killed run continues within this
+point.
 
-All input of a contact has a digest. A line of the file is a digest and a rung, whose numbers are read back exactly,
-so that repeated passes of `cascade` find the same states without a solve. An incomplete line is ignored. Marches of
-`road_history` are stored in the same way.
+A line of the file has a digest of all input of a contact, and the numbers of the contact, which are read back exactly,
+so that repeated passes find the same states without a solve. An incomplete line is ignored. Marches of `road_history`
+are stored in the same way.
 """
 
 import hashlib
@@ -42,20 +42,21 @@ NAME = "bands.part"  # removed with all unfinished files when a curve starts aga
 
 
 class ContactStore:
-    """Solved contacts of a job, on root; methods are collective."""
+    """Store of the solved contacts of a job, on root; methods are collective."""
 
     def __init__(self, slab: Slab) -> None:
         self._slab, self._job, self._path = slab, "", Path()
         self._known: dict[str, Rung] = {}
 
     def keep_in(self, directory: Path, job: Job, name: str = NAME) -> None:
-        """Store contacts in a file of this directory, and read those in it. Raises RunError if it cannot be written."""
+        """Read the contacts in a file of this directory, and store further ones there. Raises RunError if that
+        fails."""
         self._path = directory / name
         self._on_root(lambda: self._read(job))
 
     def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:
-        """Return contacts by their input in addition to the job, plain data; `solve` solves those that are not stored,
-        given by their numbers. Raises RunError if the file cannot be written."""
+        """Return the contacts with the given `states`, plain data that identify a contact of the job. `solve` gets the
+        indices of states that are not stored, and returns their contacts. Raises RunError if writing fails."""
         digests = [hashlib.sha256(repr((self._job, state)).encode()).hexdigest() for state in states]
         known = self._slab.agree([self._known.get(digest) for digest in digests])
         lacking = [number for number, rung in enumerate(known) if rung is None]
@@ -68,7 +69,7 @@ class ContactStore:
         return [rung or solved[number] for number, rung in enumerate(known)]
 
     def clear(self) -> None:
-        """Forget all contacts, as their point has been written."""
+        """Remove all contacts, as their point has been written."""
         self._known = {}
         if self._path.name:
             self._on_root(lambda: self._path.unlink(missing_ok=True))
@@ -122,7 +123,8 @@ NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved
 
 
 class Task(NamedTuple):
-    """One contact: band, sample, rung, and the law of all finer bands."""
+    """One contact to solve: numbers of band, sample and rung (pressure of the ladder), and the closing of finer
+    bands."""
 
     band: int
     sample: int
@@ -134,10 +136,10 @@ class Task(NamedTuple):
 class BandResult:
     """Result of one band under a distribution of pressure.
 
-    Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
-    shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; arrays that
-    effects `found`, averaged over its rungs (`band.Probe`); absolute errors of friction and of area by solver, time
-    steps and grid.
+    Weights of the ladder and load [Pa]; friction force of the band's waves divided by the whole load [-], from the
+    dissipated power and by slopes; area at the band's shortest wave, counted and corrected; share of the load above the
+    ladder; power [W/m^2] per branch; arrays that effects `found`, averaged over the ladder (`band.Probe`); absolute
+    errors of friction and of area by solver, time steps and grid.
     """
 
     weights: Array
@@ -153,8 +155,8 @@ class BandResult:
 
 
 class Shares(NamedTuple):
-    """Rungs under a distribution of pressure: their pressures and loads [Pa], the mean pressure of the road [Pa], and
-    the power of each to a common factor."""
+    """A ladder under a distribution of pressure: `pressures` and `loads` of its rungs [Pa], the `mean` pressure of the
+    road [Pa], and the `power` of each rung, up to a common factor."""
 
     pressures: Array
     loads: Array
@@ -163,17 +165,17 @@ class Shares(NamedTuple):
 
 
 def by_load(shares: Shares) -> Array:
-    """Return the weights of rungs in a mean over the load."""
+    """Return the weights of the rungs of a ladder in a mean weighted by load."""
     return shares.loads / shares.loads.sum()
 
 
 def by_square(shares: Shares) -> Array:
-    """Return the weights of rungs in a mean over the square of the pressure, relative to that of the road."""
+    """Return the weights of the rungs in a mean over load times pressure, divided by the mean pressure squared."""
     return shares.loads * shares.pressures / shares.mean**2
 
 
 def by_power(shares: Shares) -> Array:
-    """Return the weights of rungs in a mean over the power; 0 without power."""
+    """Return the weights of the rungs of a ladder in a mean weighted by power; 0 without power."""
     weights = np.maximum(shares.power, 0.0)
     return np.asarray(weights / max(float(weights.sum()), TINY))
 
@@ -183,7 +185,7 @@ Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
 
 
 class Cascade:
-    """Bands of a job on the ranks of `slab`, whose points are not used; methods are collective.
+    """All bands of a job on the ranks of `slab`, whose grid points are not used; methods are collective.
 
     Contacts in its `store` are not solved again.
     """
@@ -199,7 +201,7 @@ class Cascade:
         self.pressure = math.nan
 
     def band(self, number: int, sample: int) -> Band:
-        """Return a band at its velocity and temperature; on this rank alone."""
+        """Return a band with the present velocity and temperature, made on this rank alone."""
         if (number, sample) not in self._bands:
             self._bands[number, sample] = Band(self.job, self.cut, number, sample)
             if not math.isnan(temperature := self._temperatures[number]):
@@ -212,26 +214,27 @@ class Cascade:
         return found
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
-        """Set the temperatures [deg C] of the bands; NaN for the temperature of the material."""
+        """Set the temperature [deg C] of each band; NaN means the temperature of the material."""
         for (number, _), band in self._bands.items():
             if temperatures[number] != self._temperatures[number]:
                 band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each band, which are those `at` a value of the band."""
+        """Set the factors of the moduli of each band to `at(value)` with the band's value."""
         self._factors = at, list(values)
         for (number, _), band in self._bands.items():
             band.set_factors(at(values[number]))
 
     def press(self, velocity: Vector, pressure: float) -> None:
-        """Set the velocity [m/s] and the mean pressure [Pa]."""
+        """Set the velocity [m/s] and the mean pressure [Pa] of the road."""
         self.velocity, self.pressure = velocity, pressure
         squares = np.cumsum([0.0, *(self.band(k, 0).full_contact_rms ** 2 for k in range(self.cut.count))])
         self.ladders = [PressureLadder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
 
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
-        """Solve all rungs of all bands with the laws of finer ones (upward pass), separately for each sample."""
+        """Make the upward pass, separately for each sample: solve all bands at all pressures of their ladders, with the
+        laws of finer bands. Return the rungs by band and sample."""
         found: dict[tuple[int, int], list[Rung]] = {}
         laws: dict[int, Constraint] = dict.fromkeys(samples, Box())
         touching = dict.fromkeys(samples, 0.0)
@@ -249,14 +252,14 @@ class Cascade:
         return found
 
     def closing_of(self, number: int, approaches: Sequence[float] | Array) -> tuple[InterfaceLaw, float]:
-        """Return the closing of a band and all finer ones by the approaches [m] of its rungs, and the approach where c
-        is 0, without the residual of the solver."""
+        """Return the closing c(p) of a band and all finer bands, from the approaches [m] of the band's rungs, and the
+        approach where c is 0. Approaches are first made to rise: only the residual of the solver lets them fall."""
         closings = np.maximum.accumulate(approaches)
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
 
     def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
-        """Distribute the load over the bands (downward pass). `solve(band, weights)` returns the rungs of a band."""
+        """Make the downward pass: distribute the load over the bands, whose rungs `solve(band, weights)` returns."""
         weights, found, lost = np.ones(1), list[BandResult](), 0.0
         for number, ladder in enumerate(self.ladders):
             rungs = solve(number, weights)
@@ -288,7 +291,7 @@ class Cascade:
         )
 
     def hard(self, sample: int) -> Results:
-        """Return the results without laws: each band alone, on hard walls."""
+        """Return the results on hard walls: each band alone, without the laws of finer bands."""
 
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]
@@ -303,14 +306,14 @@ class Cascade:
         return self.fall(solve)
 
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
-        """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
+        """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if a solve fails."""
         laws = [tuple(np.asarray(value).tobytes() for value in vars(task.law).values()) for task in tasks]
         here = self.velocity, self.pressure, self._temperatures, self._factors and self._factors[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
         return self.store.find(states, lambda lacking: self.share([tasks[number] for number in lacking], self._solve))
 
     def share(self, tasks: Sequence[T], solve: Callable[[T], Rung]) -> list[Rung]:
-        """Solve tasks, each on one rank. Raises RunError on all ranks if one fails."""
+        """Solve tasks, each on one rank, and return all results. Raises RunError on all ranks if one fails."""
         rank, size = self.slab.comm.rank, self.slab.comm.size
         own: list[Rung | None] = []
         problem = ""

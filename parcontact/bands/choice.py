@@ -1,8 +1,6 @@
-"""Choice of the bands of a job from its spectrum, or from its measured map.
+"""Choice of the bands of a job, from its spectrum or measured map: numbers of bands, boxes, points and surfaces.
 
-Choice of the open parameters of a job in bands: numbers of bands, boxes, points and numbers of surfaces.
-
-The spectrum of a job's surface as one function, and moments of its waves between two wavenumbers.
+The spectrum of a job's surface is one function, with moments of its waves between two wavenumbers.
 
 An isotropic spectrum Phi(k) has, between two wavenumbers,
 
@@ -10,11 +8,9 @@ An isotropic spectrum Phi(k) has, between two wavenumbers,
 
 on a line of points the integrals have one factor k less. Spectra of several rough shapes are added.
 
-Warning where linear theory fails: the surface is too steep.
+If the surface starts with a measured map, the coarsest band is the map itself, without finer waves.
 
-The coarsest band of a job whose surface starts with a measured map: the map itself, without finer waves.
-
-A road is not Gaussian, so that a spectrum alone does not describe its long waves.
+A real road is not Gaussian, so that a spectrum alone does not describe its long waves.
 """
 
 import math
@@ -43,8 +39,11 @@ POINTS = 4000  # accuracy: points of the midpoint rule over ln k; its error is 1
 
 @dataclass(frozen=True)
 class WaveSpectrum:
-    """Phi [m^4] as a function of wavenumbers [rad/m], from the `longest` to the `shortest` wavelength [m], of a surface
-    or, with `line`, of a profile along the sliding; smooth except at the `kinks` [rad/m]."""
+    """Spectrum Phi [m^4] of a surface as a function of wavenumbers [rad/m], for wavelengths `longest` to `shortest`
+    [m].
+
+    If `line` is True, the surface is a profile along the sliding. Phi is smooth except at the `kinks` [rad/m].
+    """
 
     phi: Callable[[Array], Array]
     longest: float
@@ -65,8 +64,8 @@ class WaveSpectrum:
         return float(np.sum(self.phi(k) * k ** (power + 2 - self.line)) * step / (2.0 * np.pi))
 
     def density_of_slopes(self, k: Array, low: float, high: float) -> Array:
-        """Return the mean square slope per area of the plane of wavenumbers over 4 pi^2, or per length over 2 pi on a
-        line, between two wavenumbers; 0 elsewhere."""
+        """Return the mean square slope per area of the plane of wavenumbers, divided by 4 pi^2, or on a line per
+        length, divided by 2 pi; 0 outside of the two wavenumbers."""
         inside = (k >= low) & (k < high)
         known = np.where(inside, k, low)
         return np.where(inside, self.phi(known) * known**2, 0.0)
@@ -76,7 +75,7 @@ class WaveSpectrum:
         return np.geomspace(*self.ends, count + 1)
 
     def steep_beyond(self, slope: float) -> float:
-        """Return the wavelength [m] down to which all longer waves together have this rms slope; 0 if all waves have
+        """Return the wavelength [m] above which all waves together have this rms slope; 0 if all waves together have
         less."""
         edges = self.cut(POINTS)
         middle, step = np.sqrt(edges[1:] * edges[:-1]), np.log(edges[1] / edges[0])
@@ -85,7 +84,7 @@ class WaveSpectrum:
         return float(2.0 * np.pi / middle[place]) if place < POINTS else 0.0
 
     def without_shorter(self, wavelength: float) -> "WaveSpectrum":
-        """Return the spectrum without waves shorter than this [m]."""
+        """Return the spectrum without waves shorter than this wavelength [m]."""
         return replace(self, shortest=max(wavelength, self.shortest))
 
 
@@ -146,7 +145,7 @@ WARN_STEEP_WAVES = Kind(
 
 
 def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
-    """Yield a warning if the surface is too steep for linear theory, with the usual cut-off."""
+    """Yield a warning if the surface is too steep for linear theory, with the usual cut-off of the spectrum."""
     slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
     if slope <= STEEP:
         return
@@ -164,7 +163,8 @@ RESOLVED = 8  # accuracy: points of a map per wave that it resolves
 
 @dataclass(frozen=True)
 class MapBand:
-    """Heights [m] of the map on its `grid`, shape (ny, nx), its rms slope, notes on its preparation, and warnings."""
+    """The coarsest band if it is a measured map: heights [m] on its `grid`, shape (ny, nx), rms slope, notes on its
+    preparation, and warnings."""
 
     grid: Grid
     heights: Array
@@ -181,8 +181,8 @@ WARN_NO_WAVES_OF_THE_MAP = Kind(
 
 
 def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
-    """Return the measured map with which a job's surface starts, with waves down to `shortest` [m], of `cells` cells;
-    None without a map. Raises InputError for a map that cannot be read."""
+    """Return the measured map with which a job's surface starts, as a band with waves down to `shortest` [m] and this
+    number of `cells` per shortest wave; None without a map. Raises InputError for a map that cannot be read."""
     part = job.surface[0]
     if not isinstance(part, Topography):
         return None
@@ -214,11 +214,11 @@ SAMPLE_SHARE = 0.3  # accuracy: share of the scatter of surfaces in the requeste
 
 @dataclass(frozen=True)
 class Cut:
-    """Bands as they are solved.
+    """The bands of a job as they are solved.
 
-    `edges` [rad/m]; points along x and y of each band; number of longest waves along its box; `samples`, the
-    surfaces of each band, or 0 for as many as the accuracy needs. With a `measured` map this is the coarsest band,
-    and `spectrum` is the spectrum of all others.
+    `edges` are the wavenumbers between bands [rad/m]; each band has `points` along x and y, and `waves` longest waves
+    along its box; `samples` is the number of surfaces per band, 0 for as many as the accuracy needs. A `measured` map
+    is the coarsest band, and `spectrum` is the spectrum of all other bands.
     """
 
     spectrum: WaveSpectrum
@@ -235,7 +235,7 @@ class Cut:
 
     @property
     def line(self) -> bool:
-        """True if its surfaces are profiles."""
+        """True if the surfaces of the bands are profiles."""
         return 1 in self.points
 
     @property
@@ -259,7 +259,7 @@ class Cut:
         return math.sqrt(square + self.spectrum.moment(float(self.edges[int(of_map)]), float(self.edges[-1]), 0))
 
     def rms_slope(self, band: int, first: int | None = None) -> float:
-        """Return the rms slope of a band, or of all bands from `first` to it."""
+        """Return the rms slope of a band, or of all bands from `first` to this band."""
         start = band if first is None else first
         of_map = self.measured is not None and start == 0
         square = self.measured.rms_slope**2 if self.measured and of_map else 0.0
@@ -299,7 +299,7 @@ def cut_bands(job: Job) -> Cut:
 
 
 def describe_cut(cut: Cut, job: Job) -> list[str]:
-    """Return sentences on what was chosen, and on the height and slope of the surface."""
+    """Return sentences on the chosen bands, and on the height and slope of the surface."""
     many = f"{cut.samples}" if cut.samples else f"{FEWEST} to {MOST}, as their scatter asks for"
     decades, count = math.log10(float(cut.edges[-1] / cut.edges[-2])), cut.count - bool(cut.measured)
     of_map = []
@@ -322,14 +322,14 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
 
 
 def on_one_grid_of_all(job: Job, cut: Cut) -> Job:
-    """Return a job in bands with one grid that holds all its waves, to find the frequencies they excite."""
+    """Return the job with one grid for all its waves instead of bands, to find the frequencies that they excite."""
     side = cut.wavelengths(0)[0]
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     return job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
 
 
 def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> list[Doubt]:
-    """Return warnings about a job in bands: its own, about unmeasured frequencies, and about steep waves."""
+    """Return warnings about a job in bands: about the job itself, unmeasured frequencies, and steep waves."""
     whole = on_one_grid_of_all(job, cut)
     of_map = cut.measured.doubts if cut.measured else ()
     return [*job.doubts, *of_map, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]

@@ -1,4 +1,4 @@
-"""History of a surface in bands: friction and area over time, from rest and after changes of velocity.
+"""History of a surface in bands: friction and area as functions of time, from rest and after changes of velocity.
 
 Every band is marched through the whole history at every rung of its ladder, from the finest band to the coarsest, with
 the closing of all finer bands at each instant as the law of its interface (`road_march`). Then the load is distributed
@@ -7,7 +7,8 @@ the rungs are marched on hard walls, too, for the error of the method.
 
 The nominal pressure is constant, and rungs keep their pressures. But the mean pressure on a fine band rises when the
 rubber stiffens, as smaller contacts carry the load. The rungs then remember contact under a pressure that the rubber
-did not have before. This is a part of the error of the method (`RoadHistory._error_by_memory`)."""
+did not have before. This is a part of the error of the method (`RoadHistory._error_by_memory`).
+"""
 
 import copy
 import math
@@ -43,7 +44,7 @@ EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decide
 
 
 class RungTask(NamedTuple):
-    """One march: band, surface, rung, and whether finer bands are absent."""
+    """One march to make: numbers of band, sample and rung (pressure of the ladder); `hard` without finer bands."""
 
     band: int
     sample: int
@@ -52,7 +53,8 @@ class RungTask(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """An instant with a row: its place, time since the start [s], distance slid [m], and velocity along x [m/s]."""
+    """An instant that becomes a row: place in the history, time [s] since the start, distance [m], velocity along x
+    [m/s]."""
 
     place: Place
     time: float
@@ -61,7 +63,7 @@ class Instant(NamedTuple):
 
 
 class ClosingOverTime:
-    """Closing of a band and all finer ones over time, from the approaches of its rungs, shape (rungs, places)."""
+    """Closing of a band and all finer bands at each instant, from the approaches of the band, shape (rungs, places)."""
 
     def __init__(
         self, cascade: Cascade, number: int, clock: BandClock, approaches: Array, finer: "ClosingOverTime | None"
@@ -71,7 +73,7 @@ class ClosingOverTime:
         self._known = dict[Place, tuple[InterfaceLaw, float]]()
 
     def find(self, place: Place) -> tuple[InterfaceLaw, float]:
-        """Return the law at a place, and the approach [m] where it is 0."""
+        """Return the closing at a place of the history as a law c(p), and the approach [m] at which c is 0."""
         if place not in self._known:
             before, after, share = self._clock.between(place)
             found = (1.0 - share) * self._approaches[:, before] + share * self._approaches[:, after]
@@ -88,7 +90,7 @@ After = Callable[[RungTask, int, int], None]
 
 
 class RoadHistory(RoadSliding):
-    """History of a job in bands on the ranks of `slab`; the constructor and the methods are collective."""
+    """Calculation of the history of a job in bands on the ranks of `slab`; constructor and methods are collective."""
 
     def __init__(self, job: Job, slab: Slab) -> None:
         super().__init__(job, slab)
@@ -140,22 +142,22 @@ class RoadHistory(RoadSliding):
         return found
 
     def steps(self) -> list[int]:
-        """Return the numbers of steps of a march of each band."""
+        """Return the number of steps in a march of each band."""
         return [len(clock.places) for clock in self._clocks]
 
     def track(self, band: int, sample: int) -> list[Rung]:
-        """Return the tracks of all rungs of a band."""
+        """Return the results over time of a band at all pressures of its ladder."""
         return self._tracks[band, sample]
 
     def try_march(self) -> None:
-        """March the middle rung of the finest band, to measure the time; on this rank alone."""
+        """March the finest band at the middle pressure of its ladder to measure the time; on this rank alone."""
         last = self.cut.count - 1
         middle = len(self._hard.ladders[last].rungs) // 2
         self._march_alone(dict.fromkeys(self.samples), RungTask(last, 0, middle, True))
 
     def march(self, after: After) -> None:
-        """March all bands; `after`, collective, is called after each round with its last march and the numbers of its
-        marches and of those that were known, and may raise an error to stop.
+        """March all bands. After each round `after` is called, which is collective, with the last march and the numbers
+        of marches made and already stored; it may raise an error to stop.
 
         Marches in the store of contacts (`keep_in`) are not made again.
         """
@@ -228,7 +230,7 @@ class RoadHistory(RoadSliding):
             start, slid = start + stage.seconds, slid + stage.seconds * abs(velocity)
 
     def records(self) -> Iterator[tuple[StepRow, list[list[float]]]]:
-        """Yield the row of measures.csv and those of bands.csv of each instant, after `march`."""
+        """Yield, after `march`, the row of measures.csv and the rows of bands.csv for each instant."""
         way, virgin = 1.0, self.job.initial.state == "virgin"
         if virgin:
             yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan)), []
@@ -311,5 +313,5 @@ class RoadHistory(RoadSliding):
 
 
 def halved(rungs: Sequence[T]) -> Sequence[T]:
-    """Return every second item, the last one included, or all of them if these are few."""
+    """Return every second item including the last, or all items if there are few."""
     return rungs[::-2][::-1] if len(rungs) >= 2 * NODES else rungs

@@ -1,4 +1,4 @@
-"""March of one band over a history, under the pressure of one rung, with the closing of all finer bands."""
+"""The steps of one band through a history, under one pressure of its ladder, with the closing of all finer bands."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
@@ -22,8 +22,8 @@ NONE: Array = np.zeros(1)  # of what only steady states have
 
 
 class BandMarch:
-    """Marches of one band. A march gives a `Rung` whose numbers have one more axis in front, over the places of
-    `clock`: the track of this rung. Its friction is along +x, by slopes."""
+    """Marches of one band: calculations step by step through its history. A march gives a `Rung`, whose numbers have a
+    first axis over the places of `clock`: the track under this pressure. Its friction is along +x, by slopes."""
 
     def __init__(self, band: Band) -> None:
         self.band = band
@@ -34,7 +34,7 @@ class BandMarch:
         self, pressure: float, law: LawAt | None, place: Callable[[Step], Place], below: PressureLadder | None
     ) -> Rung:
         """Return the track under a mean pressure [Pa], with the distribution of pressure over `below`, the ladder of
-        the next finer band. Without a law finer bands are absent. Raises RunError for a step that fails."""
+        the next finer band. Without a `law` finer bands are absent. Raises RunError if a step fails."""
         scene, rows = self.scene, list[Rung]()
         scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
         march = self._begin(pressure, law)
@@ -69,13 +69,13 @@ class BandMarch:
 
 
 def track_of(rows: Sequence[Rung]) -> Rung:
-    """Return rungs at successive places as one track."""
+    """Return rungs at successive places as one track, whose arrays have the place as first axis."""
     values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
     return Rung(**values, found={})
 
 
 def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
-    """Return the rung between two places of a track; friction is along `sign` times x."""
+    """Return the rung interpolated between two places of a track; friction is taken along `sign` times x."""
 
     def between(values: Any) -> Any:
         return (1.0 - share) * values[before] + share * values[after]

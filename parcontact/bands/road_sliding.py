@@ -1,4 +1,4 @@
-"""Steady sliding of a surface in bands: points of a friction curve with the columns of those on one grid."""
+"""Steady sliding of a surface in bands: points of a friction curve with the columns of points on one grid."""
 
 import math
 import time
@@ -39,9 +39,9 @@ TABLE = "bands.csv"
 class BandOutcome:
     """Results of all bands.
 
-    `results` with laws from all samples; friction and area of the first sample with laws, and without (`hard`);
-    standard errors of friction and area by the `scatter` of surfaces; the rungs of each band; `line`: these are
-    profiles; error of friction by the `memory` of rungs in a history.
+    `results` with the laws of finer bands, from all samples; friction and area of the first sample with these laws, and
+    without (`hard`); standard errors of friction and area by the `scatter` of surfaces; the rungs of each band; `line`:
+    surfaces are profiles; error of friction by the `memory` of rungs in a history.
     """
 
     results: Results
@@ -58,9 +58,8 @@ class BandOutcome:
 
     @property
     def method(self) -> list[float]:
-        """Error of the method in friction and in the corrected area: a share of the difference between hard walls and
-        laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; and the memory of rungs. 0 for one
-        band."""
+        """Errors of the method in friction and in the corrected area: a share of the difference between results with
+        and without laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; 0 for one band."""
         if len(self.results) == 1:
             return [0.0, 0.0]
         open_share = 1.0 - self.results[-1].contact_area_corrected
@@ -72,10 +71,11 @@ class BandOutcome:
 
 
 class BandLoop(Protocol):
-    """Loop by which an effect changes bands and finds its results in them. Its methods are collective.
+    """Loop of rounds by which an effect changes bands and finds its results. Its methods are collective.
 
-    A module `bands` of a capability has a function `loops` of a job and its bands (`choice.Cut`). All loops that
-    `move` share the rounds of one fixed point."""
+    The function `loops(job, cut)` in the module `bands` of an effect yields its loops. All loops that `move` share the
+    rounds of one fixed point.
+    """
 
     moves: bool  # False if the effect only finds something in a state
     words: tuple[str, str]  # what it changes, and what to try if that does not settle
@@ -87,23 +87,23 @@ class BandLoop(Protocol):
         """Set what the effect changes in the bands of the next round."""
 
     def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if a round changes it no more. `changes` are the relative ones of friction and area in the round;
-        `others` is True if all loops before it have settled."""
+        """Return True if the next round would change nothing for the effect. `changes` are the relative changes of
+        friction and area in the round; `others` is True if all loops before this one have settled."""
 
     def move(self, road: "RoadSliding", results: Results) -> None:
-        """Change it for the next round; raises RunError."""
+        """Choose what the effect changes in the next round; raises RunError."""
 
     def found(self, road: "RoadSliding", point: Point, results: Results, changes: tuple[float, float]) -> Point:
-        """Return the point of a state with what the effect found."""
+        """Return the point of a state with the results of the effect added."""
 
     def values(self, results: Results) -> Mapping[str, Sequence[float]]:
-        """Return the values of its columns of bands.csv, one for each band."""
+        """Return the values of the effect's columns of bands.csv, one for each band."""
 
 
 class RoadSliding:
     """Steady states of a job in bands, on the ranks of `slab`; the constructor and the methods are collective.
 
-    It has the interface of `march.steady.SteadySliding` for friction curves.
+    The methods are those of `march.steady.SteadySliding` for friction curves.
     """
 
     table: tuple[str, Sequence[str]] | None
@@ -121,7 +121,7 @@ class RoadSliding:
         self._results: Results = ()
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
-        """Return warnings about the job."""
+        """Return warnings about the job, also at these temperatures [deg C]."""
         return doubts_of_bands(self.job, self.cut, temperatures)
 
     def notes(self) -> list[str]:
@@ -129,15 +129,15 @@ class RoadSliding:
         return describe_cut(self.cut, self.job)
 
     def keep_in(self, directory: Path) -> None:
-        """Store contacts in a file of this directory until their point is written; raises RunError."""
+        """Store contacts in a file of this directory until their point of the curve is written; raises RunError."""
         self._cascade.store.keep_in(directory, self.job)
 
     def forget(self) -> None:
-        """Remove the contacts of the last point."""
+        """Remove the stored contacts of the last point."""
         self._cascade.store.clear()
 
     def set_temperature(self, temperature: float) -> None:
-        """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
+        """Set the temperature [deg C] for all further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
             self.set_temperatures([temperature] * self.cut.count)
             self.temperature = temperature
@@ -212,12 +212,12 @@ class RoadSliding:
 
     @property
     def place(self) -> tuple[Vector, float]:
-        """The velocity [m/s] and the pressure [Pa] of the state."""
+        """The velocity [m/s] and the pressure [Pa] of the present state."""
         return self._cascade.velocity, self._cascade.pressure
 
     @property
     def speed(self) -> float:
-        """The magnitude of the velocity [m/s]."""
+        """The magnitude of the present velocity [m/s]."""
         return math.hypot(*self._cascade.velocity)
 
     @property
@@ -226,11 +226,11 @@ class RoadSliding:
         return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each band, which are those `at` a value of the band."""
+        """Set the factors of the moduli of each band to `at(value)` with the band's value."""
         self._cascade.set_factors(at, values)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
-        """Set the temperatures [deg C] of the bands; raises InputError outside the range of the material's shift."""
+        """Set the temperature [deg C] of each band; raises InputError outside the range of the material's shift."""
         self._cascade.set_temperatures(temperatures)
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperatures[-1])))
 
@@ -333,7 +333,7 @@ class RoadSliding:
 
     @property
     def loses(self) -> bool:
-        """True for a material with losses, without which friction of the waves is that of the mesh alone."""
+        """True for a material with losses; without losses, friction of the waves is only a mesh error."""
         return len(relaxation_of(self.job.material)[2]) > 0
 
     def _interface_share(self, outcome: BandOutcome, friction: float) -> float:
@@ -341,7 +341,7 @@ class RoadSliding:
 
 
 def make_states(job: Job, slab: Slab) -> States:
-    """Return the steady states of a job, in bands or on its grid; collective."""
+    """Return the solver of the steady states of a job, in bands or on one grid; collective."""
     return on_one_grid(job, slab) if job.bands is None else RoadSliding(job, slab)
 
 

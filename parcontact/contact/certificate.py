@@ -83,8 +83,7 @@ class Iterate:
         return replace(self, d=d, gaps=gaps, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """Return the length that gaps are divided by in `Certificate`; at least LEAST_HEIGHT times and at most
-        `height`."""
+        """Return the length that gaps are divided by in `Certificate`, from LEAST_HEIGHT times `height` to `height`."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least

@@ -68,8 +68,7 @@ class Box:
         np.clip(p, self.lowest, self.highest, out=p)
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """Put `s + gamma h`, limited to the bounds, into p, and `2 p - s` into `reflected`; see
-        `Constraint.resolve`."""
+        """Put `s + gamma h`, limited to the bounds, into p, and `2 p - s` into `reflected` (`Constraint.resolve`)."""
         return float(_resolve_bounds(s, h, gamma, self.lowest, self.highest, p, reflected))
 
     def add_closing(self, u: Array, p: Array) -> Array:

@@ -218,8 +218,7 @@ def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """Interpolate from the largest cells down to points, and add the result of each grid to the next finer one;
-    collective."""
+    """Interpolate from the largest cells down to points, adding each grid to the next finer one; collective."""
     for k, level in reversed(list(enumerate(levels))):
         level.interpolate(maps[k + 1], known[k], maps[k])
 
@@ -310,8 +309,8 @@ class ExtendedPreconditioner:
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
-    """Return the number of grid points in each cell of a level along one direction with `points` points; the last cell
-    may have fewer."""
+    """Return the number of points in each cell of a level along a side with `points` points; the last may have
+    fewer."""
     length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 

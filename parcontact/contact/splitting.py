@@ -53,8 +53,7 @@ TRACE_SHARE = 1e-8  # accuracy: share of the mean square of changes that is adde
 
 
 class Acceleration:
-    """Anderson acceleration on one grid. It holds the residual f and, in single precision, DEPTH changes of s and of
-    f."""
+    """Anderson acceleration on one grid. It holds f and, in single precision, DEPTH changes of s and of f."""
 
     def __init__(self, slab: Slab) -> None:
         self.slab, self.f = slab, slab.empty()

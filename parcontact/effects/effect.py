@@ -5,7 +5,7 @@ a decision from the job alone, and states what is made, remembered and written i
 contact law, and it is called after each step.
 
 `ContactLaw` is the interface that a march uses: how a step is solved, its memory, and where surfaces touch in saved
-maps. Without an effect it is a constraint on pressures (`march.laws`). In the law of an effect, say, the gap may be the
+maps. Without an effect it is a constraint on pressures (`march.laws`). In the law of an effect the gap may be the
 unknown.
 """
 
@@ -56,8 +56,7 @@ class PreviousPressure(NamedTuple):
 class PreviousContacts:
     """Memory of earlier contacts: the last pressures, the newest first, and the last approach d.
 
-    A history of single solves stores one pressure, other histories two or more. The next pressure is written to the map
-    `spare`.
+    A history of single solves stores one pressure, other histories two or more. `spare` receives the next pressure.
     """
 
     pressures: tuple[PreviousPressure, ...]
@@ -71,8 +70,7 @@ class PreviousContacts:
 
 @dataclass(frozen=True)
 class SolvedContact(Generic[Remembered]):
-    """The contact of a step, the memory of the contact law after it, and a map `touching`, not 0 where the surfaces
-    touch.
+    """The contact of a step, the law's memory after it, and a map `touching`, not 0 where the surfaces touch.
 
     `numbers`: further results of the law, by name. `pull`: force of all tension [N]. `least_load`: loads [N] up to this
     one are errors of the solver. `snapped`: the contact passed through states without equilibrium. `remark`: a sentence
@@ -127,8 +125,8 @@ def entries_of_end(end: Detached | None, job: Any) -> dict[str, Entry]:
 
 
 def end_in(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment that a checkpoint of a contact law holds; None if there is none, or if the
-    job has another history."""
+    """Return time and load of the detachment that a checkpoint of a law holds; None without one, or for another
+    history."""
     if "detached at" not in saved or saved["detached at"] == NEVER or float(saved["history"]) != _mark(job):
         return None
     return Detached(float(saved["detached at"]), float(saved["detached under"]))
@@ -307,8 +305,7 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Return the decision whether the job turns the effect on, with its name in checkpoints; the same on every
-        rank."""
+        """Return the decision whether the job turns the effect on, with its name in checkpoints; equal on all ranks."""
         ...
 
     @staticmethod
@@ -388,8 +385,8 @@ class Effect(Protocol[Memory]):
         ...
 
     def values(self, memory: Memory) -> Sequence[float]:
-        """Return the values of the effect's columns for the last step, the same on every rank; NaN leaves a column
-        empty. Local."""
+        """Return the values of the effect's columns for the last step, equal on all ranks; NaN: an empty cell.
+        Local."""
         ...
 
     def field(self, memory: Memory, name: str) -> Array:
@@ -405,8 +402,7 @@ class Effect(Protocol[Memory]):
         return None
 
     def error_energy(self, memory: Memory) -> float | None:
-        """Return the error of the energies since the start [J]; None for the usual estimate of a body under
-        pressure."""
+        """Return the error of the energies since the start [J]; None for the usual estimate under pressure."""
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
@@ -415,7 +411,7 @@ class Effect(Protocol[Memory]):
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of a memory, by name; maps belong to the memory, or are made for the
+        """Return the checkpoint entries of a memory, by name; maps are those of the memory, or made for the
         checkpoint."""
         return {}
 
@@ -499,8 +495,8 @@ def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
 
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Box:
-    """Return the bounds of the pressure in a job, unless an effect has a contact law, in the `unit` [Pa]; pressures are
-    at most `most` units."""
+    """Return the bounds of the pressure, if no effect has a law, in the `unit` [Pa]; pressures are at most `most`
+    units."""
     hardness = job.material.hardness
     return Box() if hardness is None or hardness / unit >= most else Box(highest=hardness / unit)
 

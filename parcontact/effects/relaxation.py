@@ -29,13 +29,12 @@ def relaxation_of(material: Material) -> Prony:
 
 
 def time_factor_of(material: Material) -> float:
-    """Return the shift factor a_T [-]: relaxation times at the material's temperature divided by those at the reference
-    temperature."""
+    """Return a_T [-]: relaxation times at the material's temperature divided by those at the reference temperature."""
     return material.fitted.time_factor
 
 
 def temperature_of(material: Material) -> float:
-    """Return the temperature of a material [deg C], by default the reference temperature of its shift; NaN without a
+    """Return the temperature of a material [deg C], by default its shift's reference temperature; NaN without a
     shift."""
     body = material.fitted
     if not isinstance(body, job.Zener) or body.shift is None:

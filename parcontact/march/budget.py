@@ -312,8 +312,7 @@ def add_shear(
 
 
 def weight_of(slid: float, seconds: float) -> float:
-    """Return the weight of a step in a mean: the distance slid, or at rest a far smaller number proportional to
-    `seconds`."""
+    """Return the weight of a step in a mean: the distance slid, or at rest a far smaller share of `seconds`."""
     return slid or seconds * AT_REST or AT_ONCE
 
 
@@ -360,8 +359,8 @@ class ErrorSums:
 
     @property
     def area(self) -> ErrorParts | None:
-        """Relative errors of the area by source, as a mean over the distance slid, or over time without sliding; None
-        without contact."""
+        """Relative errors of the area by source, as a mean over distance, or over time without sliding; None without
+        contact."""
         return self._mean(1)
 
     def _mean(self, index: int) -> ErrorParts | None:

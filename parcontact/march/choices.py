@@ -88,8 +88,7 @@ class Choices:
         return self.job.material.hardness
 
     def forbidden(self, what: str) -> str:
-        """Return the reason for which an effect of the job forbids `what` (`effects.effect.Effect.forbids`); '' if no
-        effect does."""
+        """Return why an effect of the job forbids `what` (`effects.effect.Effect.forbids`); '' if no effect does."""
         return next((effect.forbids[what] for effect in self.effects.values() if what in effect.forbids), "")
 
     @cached_property
@@ -132,8 +131,7 @@ class Choices:
 
     @decided("layer")
     def layer(self) -> Verdict:
-        """Decision on a layer on a rigid base instead of the half space: another symbol of the operator, at the same
-        cost."""
+        """Decision on a layer instead of the half space: another symbol of the operator, at the same cost."""
         body = self.job.body
         return bool(body), f"{body.thickness:g} m, on a {body.base} base" if body else "no body section: a half space"
 
@@ -184,8 +182,8 @@ class Choices:
 
     @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
-        """Decision to store two earlier pressures: steps of a third or a quarter of a cell start from the pressure one
-        whole cell earlier."""
+        """Decision to store two earlier pressures: steps of 1/3 or 1/4 cell start from the pressure one whole cell
+        earlier."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
         on = self.extrapolated_starts.on and self.timeline.chooses and moves
         return on, f"the surface slides in {'' if on else 'no '}chosen steps"
@@ -220,8 +218,7 @@ class Choices:
 
     @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
-        """Decision to use a preconditioner in single precision with its own transforms; it costs no further
-        iterations."""
+        """Decision to use a preconditioner in single precision with its own transforms, without further iterations."""
         if reason := self.forbidden(SINGLE):
             return False, reason
         if self.numerics.precision != "double":
@@ -252,8 +249,7 @@ class Choices:
 
     @decided("surface spectrum")
     def spectrum(self) -> Verdict:
-        """Decision to store the transform of the surface: moments are then computed once, and forces are spectral
-        sums."""
+        """Decision to store the transform of the surface: moments are computed once, and forces are spectral sums."""
         on = any(isinstance(shape, Spectral) for shape in self.job.surface)
         return on, "the surface has waves or heights from a file" if on else "all its shapes are in closed form"
 
@@ -268,8 +264,7 @@ class Choices:
 
     @decided("energies")
     def energies(self) -> Verdict:
-        """Decision to compute work, stored and dissipated energy: one reduction per step, and one operator application
-        in a viscoelastic body."""
+        """Decision to compute energies: one reduction per step, and one operator application in a viscoelastic body."""
         asked = self.output.energy
         return asked, "output.energy asks for them" if asked else "output.energy is not set"
 

@@ -103,8 +103,8 @@ class Controller:
 
     @cached_property
     def follows(self) -> bool:
-        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the job's tolerance,
-        and stages have steps."""
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen it, and stages have
+        steps."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
@@ -297,7 +297,7 @@ def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
 
 
 def cells_per_step(most: float) -> float:
-    """Return the longest distance of a step in cells, at most `most`, out of 1, 2, 4, ... and 1/2, 1/3, ... 1/8, 1/10,
+    """Return the longest distance of a step in cells, at most `most`, out of 1, 2, 4, ... and 1/2, 1/3, ... 1/8, 1/10
     ..."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)

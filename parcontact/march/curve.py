@@ -51,8 +51,7 @@ class EarlierPoint(NamedTuple):
 
 
 class CurveTable:
-    """The tables of a friction curve in a directory, continued or new. Raises OSError, and InputError for a table that
-    cannot be read."""
+    """The tables of a friction curve in a directory. Raises OSError, and InputError for a table that cannot be read."""
 
     def __init__(
         self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
@@ -106,8 +105,7 @@ class CurveTable:
         files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
-        """Return the indices of the points that are not in the table, and the indices `bare` of points whose requested
-        maps are missing."""
+        """Return the indices of points that are not in the table, and of points `bare` of requested maps."""
         found = tables.lacking_points(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -154,14 +152,12 @@ class CurveTable:
         )
 
     def lose(self, at: Wanted, why: str) -> None:
-        """Store a point that could not be solved and the reason `why`, unless the table has the point; raises
-        OSError."""
+        """Store a point that could not be solved and the reason `why`, unless it is in the table; raises OSError."""
         self._lost = tables.without([*tables.without(self._lost, [at]), LostPoint(at, why)], self.known)
         tables.write(self.path.parent, self._lost)
 
     def conclude(self, failures: int, draw: Draw | None) -> None:
-        """Sort a curve whose points were solved in any order, `draw` it, and report the number of failures; raises
-        OSError."""
+        """Sort a curve solved in any order, `draw` it, and report the number of failures; raises OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -271,8 +267,7 @@ class Request:
 def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
-    """Return the request of a job's `steady` section, or of the other arguments; raises InputError if it is
-    incomplete."""
+    """Return the request of a job's `steady` section, or of the arguments; raises InputError if it is incomplete."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))

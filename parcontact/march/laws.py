@@ -61,8 +61,8 @@ class StepError(RunError):
 
 
 class DetachedError(Exception):
-    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state before the
-    step."""
+    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state before
+    it."""
 
     def __init__(self, time: float, load: float) -> None:
         super().__init__(time, load)
@@ -258,8 +258,7 @@ MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contac
 
 
 class ClosingLaw(DryLaw):
-    """Contact law with a closing c [m] that depends on the pressure [Pa] at the end of a step. It has no memory of its
-    own.
+    """Contact law with a closing c [m] that depends on the pressure [Pa] at the end of a step, without memory.
 
     Raises InputError for a body that moves in the mean, and for a hardness.
     """

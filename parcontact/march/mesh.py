@@ -164,8 +164,7 @@ def _of_any_stage(stage: Any) -> Any:
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Replace all words for the grid in the source of a job by numbers. Return the origin with a sentence about
-    them."""
+    """Replace all words for the grid in the source of a job by numbers. Return the origin with a sentence on them."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
 

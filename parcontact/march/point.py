@@ -120,8 +120,7 @@ def count_octaves(setup: Setup) -> int:
 
 
 def branch_maps(setup: Setup, contact: Contact, velocity: Vector, out: Array) -> Iterator[Array]:
-    """Yield the map h_k of each branch in steady sliding at a velocity [m/s]; each overwrites the last in `out`.
-    Collective."""
+    """Yield the map h_k of each branch in steady sliding at a velocity [m/s], each in `out`. Collective."""
     fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:
         for k in range(setup.prony.moduli.size):

@@ -98,8 +98,7 @@ def shortest_of(job: Job) -> float | None:
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """Return the largest numbers of waves in the box, along x and y, over the parts of the surface that are given by
-    waves."""
+    """Return the largest numbers of waves in the box, along x and y, of the surface's parts given by waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:
         if isinstance(part, jobs.Wave):

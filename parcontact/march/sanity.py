@@ -65,8 +65,7 @@ def refuse_memory(job: Job) -> None:
 
 
 def is_quickly_made(job: Job) -> bool:
-    """Return True if warnings depend on the heights of a job, and the heights are few enough to be computed for
-    them."""
+    """Return True if warnings depend on the heights of a job, and these are few enough to be computed for them."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
@@ -133,8 +132,8 @@ def has_full_contact(setup: Setup) -> bool:
 
 
 def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
-    """Return a sentence if an approach [m] is beyond full contact, else ''; `mean` [m] is the mean height relative to
-    the datum."""
+    """Return a sentence if an approach [m] is beyond full contact, else ''; the datum is `mean` [m] below the mean
+    height."""
     closed = -mean - setup.surface.datum
     rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
     if approach - closed <= rounding:
@@ -146,8 +145,7 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def below_rounding(setup: Setup, approach: float) -> str:
-    """Return a sentence if an approach [m] is lost in the rounding of the heights, else ''; an approach of 0 is never
-    lost."""
+    """Return a sentence if an approach [m] other than 0 is lost in the rounding of the heights, else ''."""
     heights = setup.heights.span + abs(setup.surface.datum)
     least = float(np.finfo(np.float64).eps) / RESOLVED * heights
     if not 0.0 < abs(approach) < least:
@@ -259,7 +257,7 @@ class ContactWatch:
         return self.check_point(measures, f"step {step}", ends_a_stage)
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
-        """Return warnings about a contact, and about its cells if it is `final`; raises RunError if warnings are
+        """Return warnings about a contact, and about its cells if it is `final`; raises RunError if these are
         errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
@@ -296,8 +294,7 @@ WARN_CELLS = Kind(
 
 
 def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a warning about contacts that consist mainly of edge cells, or are smaller than a cell; `more` states how
-    to refine the grid."""
+    """Yield a warning about contacts of few cells, mostly edge cells or parts of a cell; `more` states the remedy."""
     area, corrected = measures.contact_area, measures.contact_area_corrected
     if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
         yield WARN_BELOW_A_CELL("", {"where": where, "more": more})

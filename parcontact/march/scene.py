@@ -105,8 +105,7 @@ class Setup:
 
 @dataclass
 class Scene:
-    """All objects of a calculation in time. `law` is the contact law of an effect, or None for the law of the
-    constraint."""
+    """All objects of a calculation in time. `law` is the contact law of an effect, or None for the usual law."""
 
     setup: Setup
     motion: Motion
@@ -194,14 +193,13 @@ class Scene:
         return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
 
     def heights(self, position: Vector) -> Array:
-        """Return the heights of the rigid surface at a position, on the rows of this rank, in the run's units, as a new
-        array."""
+        """Return the heights of the rigid surface at a position: this rank's rows, in the run's units, a new array."""
         base, offset = self.motion.at(position).parts
         return np.roll(base, offset, axis=1)
 
     def gap(self, displacement: Array, position: Vector, approach: float) -> Array:
-        """Return the gap [m] on the rows of this rank for a rigid surface at a position; displacement and approach are
-        in the run's units."""
+        """Return the gap [m] on this rank's rows for a surface at a position; displacement and approach are in run's
+        units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Box:
@@ -225,8 +223,7 @@ def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> S
 
 
 def outline(job: Job, slab: Slab) -> Setup:
-    """Return the setup of a job for planning: its slab only counts, the surface has waves but no heights, and units are
-    1."""
+    """Return the setup of a job for planning: its slab only counts, the surface has only waves, and units are 1."""
     slab.tally.purpose = "transforms"
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
@@ -271,8 +268,7 @@ def solver_on(
 
 
 def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
-    """Return a function that makes a solver and operators on tiles of a grid, on one rank; None if the body has no such
-    operators."""
+    """Return a function that makes a solver and operators on tiles, on one rank; None if the body has none."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 

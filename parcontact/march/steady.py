@@ -143,8 +143,8 @@ class SteadySliding:
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of a map in the last state: `pressure` [Pa], `displacement`, `gap` or `height` [m],
-        or a map of an effect."""
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or an effect's map, last
+        state."""
         assert self.contact is not None
         for loop in self.loops:
             if name in loop.fields:
@@ -274,8 +274,7 @@ def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
 
 
 def tolerance_of(asked: float, free: bool = False) -> float:
-    """Return the limit on the certificate of a steady state for the tolerance `asked` by a job; `free` is True in a
-    free box."""
+    """Return the limit on the certificate of a steady state for the tolerance `asked`; `free` for a free box."""
     return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 

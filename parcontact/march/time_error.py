@@ -296,8 +296,7 @@ def share_of_area(run: RunProperties, observed: StepObservation) -> float:
 
 
 def order_of_time_error(integrator: str, curved: bool) -> float:
-    """Return the power of the step length with which the time error grows; `curved` is True if the displacement is
-    quadratic in time."""
+    """Return the power of the step length with which the time error grows; `curved`: u is quadratic in time."""
     if integrator == "backward-euler":
         return 1.0
     return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order

@@ -244,8 +244,7 @@ class ZenerBody:
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which a checkpoint must
-        match."""
+        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which must match."""
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),

@@ -108,8 +108,7 @@ class StepProducts(NamedTuple):
 
 
 def dissipation_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the energy dissipated in a step `z = dt/tau`, the integral of `<h, A^-1
-    h>/(G tau)`."""
+    """Return the weights of `StepProducts` in the energy dissipated in a step z = dt/tau: int <h, A^-1 h>/(G tau)."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     lost, q = -np.expm1(-safe), bend(safe)
@@ -142,8 +141,7 @@ def bend_weights(z: Array) -> StepProducts:
 
 
 def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
-    """Return `exp(-z s)`, a and b of (1) at the quadrature points s = NODES, along an additional axis, for z up to
-    SMALL."""
+    """Return `exp(-z s)`, a and b of (1) at the quadrature points s = NODES, along a new axis, for z up to SMALL."""
     x = z[..., None] * NODES
     change = NODES * (np.exp(-x[..., None] * NODES) @ WEIGHTS)
     later = 2.0 * NODES[:, None] * (1.0 - NODES) - 1.0  # 2 x - 1 at x = s - s y
@@ -172,14 +170,13 @@ class ElasticEnergy:
         body: BodyMemory,
         growth: float = 0.0,
     ) -> EnergyMemory:
-        """Return the energies after a solve for the pressure `now` with the displacement u; one reduction;
+        """Return the energies after a solve for the pressure `now` with the displacement u; one reduction,
         collective."""
         stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
         return EnergyMemory(work=stored, stored=stored)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entry of the stored energy, which is optional, as the energy follows from each
-        contact."""
+        """Return the checkpoint entry of the stored energy, which is optional, as each contact gives it."""
         return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
@@ -213,8 +210,7 @@ class AppliedInverse:
 
 
 class ElasticPressure:
-    """Computes `v = A^-1 u` if the inverse of A is not available: the pressure that causes u on an elastic body of
-    modulus 1.
+    """Computes `v = A^-1 u`, the pressure that causes u on an elastic body of modulus 1, without an inverse of A.
 
     A acts on space and relaxation on time, so that they commute: with `h_k = A m_k` the law of the body,
 
@@ -311,7 +307,7 @@ class ZenerEnergy:
         return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, own, crossed, elastic)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries: the energies, the sums needed to continue them, and the memory of
+        """Return the checkpoint entries: energies, sums needed to continue them, and the memory of
         `ElasticPressure`."""
         spring = units.height**2 / units.length
         return {

@@ -46,8 +46,7 @@ Memory = TypeVar("Memory")
 
 @dataclass(frozen=True)
 class Entry:
-    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers. Multiply by `unit` for SI
-    units.
+    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers; times `unit` in SI units.
 
     A checkpoint may lack an `optional` entry, which `restored` then replaces. A `given` entry follows from the job: it
     is not restored, and a checkpoint with another value is refused.

@@ -227,8 +227,7 @@ class HalfSpace:
 
     @property
     def long_waves(self) -> LongWaves | None:
-        """Compliance of waves longer than the softest wave of a layer, for a preconditioner; None without such
-        waves."""
+        """Compliance of waves longer than a layer's softest wave, for a preconditioner; None without such waves."""
         return None if self.layer is None else self.layer.long_waves(self.size)
 
     # -- elastic ------------------------------------------------------------------------------------------------------
@@ -249,8 +248,7 @@ class HalfSpace:
         return found if self.layer is None else found * self.layer.compliance_ratio(q)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return the ratio of pressure to displacement of each wave, `|q|/(1 - nu)` on a half space, without the
-        kernel.
+        """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space, without the kernel.
 
         At q = 0, where a periodic half space has no inverse, the ratio is the value of the smallest wavenumber, which
         keeps it positive. Waves on a layer that are longer than the softest wave get the stiffness of the softest wave:

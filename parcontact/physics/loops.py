@@ -324,8 +324,7 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
 
 
 def shape_of(waves: tuple[int, int], lengths: tuple[int, int], columns: slice) -> tuple[int, int]:
-    """Return the shape of this rank's part of the lowest waves: at most `waves` in the box along x and y, in its
-    `columns`."""
+    """Return the shape of this rank's part of the lowest waves: `waves` along x and y at most, in its `columns`."""
     count = min(waves[0], lengths[0] // 2) + 1
     return min(2 * waves[1] + 1, lengths[1]), max(0, min(count, columns.stop) - columns.start)
 

@@ -1,5 +1,4 @@
-"""Measures of one instant of a contact, and the certificate of a solve. To be read quickly, the module imports no
-other."""
+"""Measures of one instant of a contact, and the certificate of a solve; no imports, so that it is read quickly."""
 
 import math
 from dataclasses import dataclass, replace

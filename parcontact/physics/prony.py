@@ -316,8 +316,7 @@ def fit_exponentials(shortest: float, longest: float, error: float) -> Exponenti
 
 
 def shares_of_step(x: slab_Array) -> tuple[slab_Array, slab_Array]:
-    """Return the weights, per unit of dt, of the heat before and after a step `x = rate dt`, for heat linear in
-    time."""
+    """Return the weights, per dt, of the heat before and after a step `x = rate dt`, for heat linear in time."""
     small = np.minimum(x, 1e-3)
     safe = np.maximum(x, 1e-3)
     mean = np.where(x < 1e-3, 1.0 - small / 2 + small**2 / 6 - small**3 / 24, -np.expm1(-safe) / safe)

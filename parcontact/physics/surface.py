@@ -88,7 +88,7 @@ class Pyramidal:
 
 @dataclass(frozen=True)
 class FlatEnded:
-    """A round punch: a flat face (height 0) with a `radius`, and around it a parabola with the radius of curvature
+    """A round punch: a flat face (height 0) with a `radius`, and a parabola around it with the curvature radius
     `edge`."""
 
     radius: float
@@ -107,8 +107,7 @@ class FlatEnded:
 
 @dataclass(frozen=True)
 class Round:
-    """A sphere, or a cylinder along x or y, with its highest point (height 0) at the centre; the profile is parabolic,
-    or circular if `exact`."""
+    """A sphere, or a cylinder along x or y, with its top (height 0) at the centre; a parabola, or `exact` circle."""
 
     radius: float
     centre: tuple[float, float]

@@ -1,1 +1,1 @@
-"""Results of runs, curves, sweeps and studies: tables, texts, pictures and reports."""
+"""Results of runs, curves, sweeps and studies as tables, texts, pictures and reports."""

@@ -1,12 +1,12 @@
 """Panels of friction curves, of bands, and of sweeps.
 
-A curve (steady.csv) is drawn over velocity, or over pressure if only that varies; several temperatures are separate
-lines, which a_T v puts on one master curve. Bands have their friction over velocity, and over the slip of each slide of
-a history, their area over magnification, and what capabilities have by band. Persson's theory is drawn if its table
-exists, and steady sliding with a history if steady.csv does.
+A curve (steady.csv) is drawn against velocity, or against pressure if only pressure varies. Several temperatures are
+separate lines; against a_T v they form one master curve. Panels of bands show friction against velocity, and against
+the slip of each slide of a history, area against magnification, and quantities of effects by band. Persson's theory is
+drawn if its table exists, and steady sliding next to a history if steady.csv exists.
 
-Points of a sweep are cases, lines their means over seeds. Each value of another key has its own line: values of the
-first such key have colours, values of further keys dashes.
+Points of a sweep are cases, lines are their means over seeds. Each value of a second swept key has its own line and
+colour; values of further keys have dashes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,7 +45,7 @@ ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
 def panels_of_bands(directory: Path) -> list[Panel]:
-    """Return panels of a table of bands of a curve, for its first pressure and temperature."""
+    """Return panels of a curve's table of bands, for its first pressure and temperature."""
     curve = Results(directory, "curve")
     if "velocity" not in curve.read(BANDS):
         return []
@@ -67,8 +67,8 @@ def panels_of_bands(directory: Path) -> list[Panel]:
 
 
 def panels_of_slips(run: PlottedRun) -> list[Panel]:
-    """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
-    by band in the last slide; none without a slide."""
+    """Return panels of a history in bands against the slip since the start of each slide: friction and area, and
+    friction by band in the last slide; an empty list without a slide."""
     stages = run.job.history
     ways = np.array([stage.seconds * stage.speed for stage in stages])
     starts = np.cumsum(ways) - ways
@@ -187,7 +187,8 @@ THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn 
 
 
 def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
-    """Return panels of a table of steady states; none without states, or if `over` is not possible."""
+    """Return panels of a table of steady states against the axis `over`; none without states, or for an impossible
+    axis."""
     curve = Results(directory, "curve")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
     if over in ("time", "distance") or not columns["velocity"].size:
@@ -234,7 +235,7 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
 
 
 def steady_title(directory: Path) -> str:
-    """Return the title of the job, with the pressure or force if it is the same at all points."""
+    """Return the title of a curve's picture: the job's, with the pressure or force if all points have the same."""
     curve = Results(directory, "curve")
     axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
     name = (curve.job.title if curve.job else "") or "steady sliding"
@@ -301,14 +302,14 @@ Rows = Sequence[dict[str, Any]]
 
 
 def all_panels() -> Panels:
-    """Return the panels of a sweep, with those of capabilities, in the order of the columns of sweep.csv."""
+    """Return all panels that a sweep may have, including those of effects, in the order of the columns of sweep.csv."""
     found = (*PANELS, *offered("SWEEP_PANELS"))
     place = names_of(SWEEP).index
     return tuple(sorted(found, key=lambda panel: place(next(iter(panel.columns.values())))))
 
 
 def panels_of_sweep(directory: Path) -> list[Panel]:
-    """Return panels of a sweep; none without results, or without a swept key of numbers."""
+    """Return panels of a sweep; an empty list without results, or if no swept key has numbers."""
     table = Results(directory, "sweep").points
     rows, panels = read_cases(table), all_panels()
     keys = _find_keys(rows)

@@ -1,10 +1,9 @@
-"""Files of fitted materials, and pictures of studies.
+"""Files of fitted materials, which jobs include, with pictures; and the picture of a study.
 
-Files of a fitted material: a material file that jobs include, and a picture.
+The picture of a material shows moduli at the reference temperature with the fit, residuals, branches and shift factors.
 
-The picture shows moduli at the reference temperature with the fit, residuals, branches and shift factors.
-
-Picture of a study: errors over the refinement of mesh and time step (as Fig. 6 of the paper), and over time.
+The picture of a study shows errors against the refinement of mesh and time step (as Fig. 6 of the paper), and against
+time.
 """
 
 import math
@@ -40,7 +39,8 @@ def refuse_foreign(target: Path) -> None:
 
 
 def write_compound(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
-    """Write both files, and yield messages; `job_band` [Hz] are the frequencies of a job. Raises InputError."""
+    """Write the material file and its picture, and yield messages; `job_band` [Hz] is a job's range. Raises
+    InputError."""
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -61,7 +61,7 @@ def write_compound(compound: Compound, target: Path, job_band: tuple[float, floa
 
 
 def draw_compound(compound: Compound, path: Path, job_band: tuple[float, float] | None = None) -> None:
-    """Write the picture, a png, with the frequencies of a job shaded; raises OSError."""
+    """Write the picture of a fitted material as png, with the range `job_band` [Hz] of a job shaded. Raises OSError."""
     shades = [Shade("frequencies of the job", *job_band)] if job_band else []
     panels = [replace(panel, shades=shades) for panel in _moduli(compound)]
     branches = Line("", compound.series.times, compound.series.moduli, DOTS)
@@ -134,7 +134,8 @@ LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
 
 @dataclass(frozen=True)
 class StudyCurve:
-    """Errors of one quantity along one ladder of sizes (over the size of the box), and times of all steps [s]."""
+    """Errors of one quantity along one `ladder` of refined `sizes` (relative to the box), and times of all steps
+    [s]."""
 
     quantity: str
     integrator: str
@@ -144,14 +145,14 @@ class StudyCurve:
     seconds: Sequence[float]
 
     def over(self, x: Array) -> Line:
-        """Return the line of the errors [%] over other values."""
+        """Return the line of the errors [%] against the values x."""
         mark, dashes = MARKS[self.ladder]
         look = {"color": INTEGRATORS[self.integrator], "marker": mark, "linestyle": dashes}
         return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)
 
 
 def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
-    """Draw `convergence.png` and return its path; None if nothing is refined.
+    """Draw `convergence.png` of a study and return its path; None if nothing is refined.
 
     `doubts` are the relative uncertainties of the references; errors below them are in grey bands.
     """

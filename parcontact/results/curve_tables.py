@@ -1,8 +1,8 @@
-"""Parts of a report, and the tables of curves at its top.
+"""Parts of a report, and the tables of friction curves at its top.
 
-* Parts of a report: texts, tables, pictures, browsers of maps and data, all stored in the page.
-* Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
-  several side by side, and the lengths, frequencies and moduli that matter.
+* Parts are texts, tables, pictures, browsers of maps and data, all stored in the page.
+* Tables show friction by speed and temperature for each pressure, of one curve or of several side by side, and the
+  important lengths, frequencies and moduli.
 """
 
 import base64
@@ -38,7 +38,7 @@ Download = tuple[str, str, int]  # a file stored in the page: its name, data URI
 
 @dataclass(frozen=True)
 class ReportTable:
-    """A table: names of columns, and rows of texts."""
+    """A table of a report: names of columns, and rows of texts."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -47,7 +47,7 @@ class ReportTable:
 
 @dataclass(frozen=True)
 class ReportSection:
-    """A section of a report: heading and contents, shown in the order of the fields; `texts` are shown verbatim."""
+    """A section of a report: a heading and contents, shown in the order of the fields. `texts` are shown verbatim."""
 
     title: str
     sentences: Sequence[str] = ()
@@ -75,7 +75,7 @@ class ReportSection:
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter on one output directory; `headline` is a sentence with its results."""
+    """A chapter of a report about one output directory; `headline` is a sentence with the results."""
 
     title: str
     directory: Path
@@ -99,7 +99,7 @@ def draw_panel(panel: Panel, caption: str = "") -> Picture:
 
 
 def embed_file(path: Path) -> Download:
-    """Return a table as a download in the page."""
+    """Return a file as a download that is stored in the page."""
     data = path.read_bytes()
     return path.name, to_uri(data, "text/csv"), len(data)
 
@@ -115,7 +115,7 @@ Place = tuple[float, float, float]  # speed [m/s], pressure [Pa], temperature [d
 
 
 def friction_tables(curve: Results) -> list[ReportTable]:
-    """Return a table for each pressure, with a row for each speed and a column for each temperature."""
+    """Return a table of friction for each pressure, with a row for each speed and a column for each temperature."""
     cells = {_round(one.at, curve.temperature): "not solved" for one in tables.read(curve.path)}
     cells = _cells(curve) | cells
     degrees, found = list(dict.fromkeys(place[2] for place in sorted(cells, key=_order))), []
@@ -130,7 +130,7 @@ def friction_tables(curve: Results) -> list[ReportTable]:
 
 
 def compared_table(directories: Sequence[Path], names: Sequence[str]) -> list[ReportTable]:
-    """Return a table of the friction of several curves at the points that at least two have; none without any."""
+    """Return a table with the friction of several curves at points that two or more have; an empty list without any."""
     each = [_cells(Results(one, "curve")) if Results(one).has("steady.csv") else {} for one in directories]
     places = sorted({place for cells in each for place in cells}, key=_order)
     shared = [place for place in places if sum(place in cells for cells in each) > 1]
@@ -166,8 +166,8 @@ def _order(place: Place) -> tuple[float, float, float]:
 
 
 def scales_table(curve: Results) -> list[ReportTable]:
-    """Return the lengths, frequencies and moduli that matter for a curve; none if the files of its job no longer
-    exist."""
+    """Return a table of the lengths, frequencies and moduli that matter for a curve; empty if the job's files are
+    gone."""
     if (path := curve.job_file) is None:
         return []
     with suppress(InputError):

@@ -1,22 +1,23 @@
 """Cycles of stages that oscillate: loss, amplitudes and phase, from the rows of measures.csv; the table cycles.csv.
 
-The force F and the displacement s belong together: the normal force and the approach where a load or an approach
-oscillates, the tangential force and the position of the surface where its velocity does. The loss of a cycle is the
-area of its loop,
+If a load or an approach oscillates, the force F is the normal force and s the approach; if a velocity oscillates, F is
+the tangential force and s the position of the surface. The loss of a cycle is the area of its loop,
 
     W = int (F - <F>) ds,
 
-with the mean force <F> over the time of the cycle, as creep under the mean force is no part of the loop. A cycle that
-repeats the last one dissipates W. `phase` is the angle [rad] by which s lags behind F, of their first harmonics: 0 for
-an elastic body.
+with <F> the mean force over the cycle, as creep under the mean force is no part of the loop. A cycle that repeats the
+last one dissipates W. `phase` is the angle [rad] by which the first harmonic of s lags behind that of F: 0 for an
+elastic body.
 
 Between two rows F and s are Hermite's cubics with slopes by differences. The error of W has up to four parts:
 
-* by this interpolation: that over pairs of steps, of an order of at least three;
-* where something slides, the error of friction, weighted with the force;
-* else by the length of steps: that of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS;
-* by the solver, as for the area (`march.budget`), over the root of the number of steps, and over sin phase, as the
-  loop is the small difference of two paths; and by the mesh, MESH of the error of the area."""
+* by this interpolation: the difference to interpolation over pairs of steps, divided by its order of at least three;
+* if something slides, the error of friction, weighted with the force;
+* else by the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`), times
+  HARMONICS;
+* by the solver, as for the area (`march.budget`), divided by the root of the number of steps, and by sin phase, as the
+  loop is the small difference of two paths; and by the mesh, MESH of the error of the area.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,8 +51,11 @@ Columns = Mapping[str, Sequence[float]]
 
 @dataclass(frozen=True)
 class Cycle:
-    """A row of cycles.csv: `loss` [J] with its relative error; amplitudes are half the range within the cycle, of
-    friction NaN where nothing slides, of the approach [m]; `phase` [rad]."""
+    """A row of cycles.csv, for one whole cycle of a stage.
+
+    `loss` [J] has the relative error `error_loss`. Amplitudes are half the range within the cycle: of friction, NaN
+    where nothing slides, and of the approach [m]. `phase` is in rad.
+    """
 
     stage: int
     cycle: int
@@ -64,7 +68,7 @@ class Cycle:
 
 
 def find_cycles(job: Job, columns: Columns) -> list[Cycle]:
-    """Return all whole cycles in the columns of measures.csv."""
+    """Return the rows of all whole cycles in the columns of measures.csv."""
     found, start = list[Cycle](), 0.0
     table = {name: np.asarray(values, float) for name, values in columns.items()}
     for index, stage in enumerate(job.history):
@@ -145,7 +149,7 @@ def _step_error(job: Job, stage: Stage, dt: Array) -> float:
 
 
 def measure_last(job: Job, columns: Columns) -> dict[str, float]:
-    """Return loss, its error, and phase of the last cycle by their names; none without a whole cycle."""
+    """Return the loss of the last cycle, its error, and the phase, by their names; empty without a whole cycle."""
     found = find_cycles(job, columns)
     return {name: getattr(found[-1], name) for name in ("loss", "error_loss", "phase")} if found else {}
 
@@ -191,13 +195,13 @@ def _describe(job: Job, stage: Stage, cycles: Sequence[Cycle]) -> str:
 
 
 def friction_along(stage: Stage, columns: Mapping[str, Array]) -> Array:
-    """Return the tangential force [N] against the motion along the velocity of a stage, or its amplitude."""
+    """Return the tangential force [N] against the motion, along the velocity of a stage or the velocity's amplitude."""
     (x, y), speed = stage.velocity, stage.speed or 1.0
     return -(columns["force_x"] * x + columns["force_y"] * y) / speed
 
 
 def way_along(stage: Stage, columns: Mapping[str, Array], start: float) -> Array | None:
-    """Return the positions [m] along the velocity of a stage that began at `start` [s]; None if it is constant."""
+    """Return the positions [m] along the velocity of a stage that began at `start` [s]; None at constant velocity."""
     if not isinstance(stage.velocity, Swing):
         return None
     return stage.speed * np.array([stage.moving(time - start) for time in columns["time"].tolist()])

@@ -1,7 +1,8 @@
-"""Tables for programs of finite elements: friction over slip rate, pressure and temperature, as csv or for Abaqus.
+"""Tables for finite element programs: friction by slip rate, pressure and temperature, as csv or for Abaqus.
 
-Points of a friction curve at which waves of the surface excite the rubber beyond its measured frequencies or
-temperatures are left out, and named. Capabilities export tables of runs."""
+Points of a friction curve are omitted, and named, if waves of the surface excite the rubber beyond its measured
+frequencies or temperatures there. Effects export tables of runs.
+"""
 
 import math
 import textwrap
@@ -29,8 +30,9 @@ OUTSIDE = ("frequencies", "temperatures")  # kinds of warnings for which a point
 
 
 def export_results(directory: Path, form: str, out: Path | None = None) -> Iterator[str]:
-    """Write the tables of a directory as `csv` or `abaqus`, each to a file in it or the only one to `out`; yield
-    sentences. Raises InputError if there is none in this form, or a file cannot be written."""
+    """Write the tables of a directory in the form `csv` or `abaqus`, each to a file in this directory, or a single
+    table to `out`; yield sentences. Raises InputError if there is no table of this form, or a file cannot be
+    written."""
     if not directory.is_dir():
         raise InputError(f"{directory} is not a directory")
     results = Results(directory)

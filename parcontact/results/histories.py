@@ -1,4 +1,4 @@
-"""Panels of a run over time, distance, velocity, load or approach."""
+"""Panels of a run against time, distance, velocity, load or approach."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,8 +38,8 @@ VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an 
 
 @dataclass(frozen=True)
 class Abscissa:
-    """The horizontal axis: SI values of all or some rows, shades of stages, and whether rows have marks. `loop`: values
-    return, as loads and approaches do."""
+    """The horizontal axis of a run's panels: SI `values` of all or some `rows`, `shades` of stages, and whether rows
+    are `marked`. `loop` is True if values return, as loads and approaches do."""
 
     axis: Axis
     values: Array
@@ -49,7 +49,7 @@ class Abscissa:
     loop: bool = False
 
     def series(self, lines: dict[str, Array]) -> list[Line]:
-        """Return lines with their names; a single line has no name."""
+        """Return lines for the given arrays, with their names; a single line gets no name."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows

@@ -1,8 +1,8 @@
 """Texts about results: `parcontact info`, headlines and citations.
 
 * Descriptions of files of a run and of output directories, with checks for damage.
-* The headline of a report: a sentence with the main results of a job and their errors.
-* References to cite for a run: this program, and the references of its job (`files.provenance`).
+* Headline of a report: a sentence with the main results of a job and their errors.
+* References to cite for a run: this program, and the references for its job (`files.provenance`).
 """
 
 import json
@@ -37,7 +37,7 @@ NOT_HDF5 = "file signature not found"  # message of HDF5 for files of another ki
 
 
 def describe_path(path: Path) -> tuple[str, bool]:
-    """Return a description of a checkpoint, a field file or an output directory, and whether it is undamaged; on one
+    """Return a description of a checkpoint, a field file or an output directory, and True if it is undamaged; on one
     rank."""
     if path.is_dir():
         return describe_files(path)
@@ -57,7 +57,7 @@ def describe_path(path: Path) -> tuple[str, bool]:
 
 
 def describe_all(paths: Sequence[Path]) -> tuple[str, bool]:
-    """Return descriptions of several paths, and whether all are undamaged; an error is part of the description."""
+    """Return descriptions of several paths, and True if all are undamaged; an error becomes part of the description."""
     found = []
     for path in paths:
         try:
@@ -124,7 +124,7 @@ def _short(value: NDArray[Any]) -> str:
 
 
 def describe_files(directory: Path) -> tuple[str, bool]:
-    """Return a description of a directory, and whether all of it is readable; raises InputError if it has no
+    """Return a description of an output directory, and True if all of it is readable; raises InputError if it has no
     results."""
     try:
         claims = tables.read_claims(directory)
@@ -170,7 +170,7 @@ def _run(found: Results) -> Iterator[str]:
 
 
 def describe_run_in_words(run: Results) -> Iterator[str]:
-    """Yield sentences on the slide, the cycles and the capabilities of a run."""
+    """Yield sentences on the slide and the cycles of a run, and sentences of its effects."""
     if (job := run.job) is not None:
         yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
         yield from cycles.describe_cycles(job, run.table)
@@ -291,7 +291,7 @@ Columns = Mapping[str, Sequence[float]]
 
 
 def find_headline(directory: Path) -> str:
-    """Return the headline of an output directory: a sentence for each of its run, friction curve, sweep and study."""
+    """Return the headline of an output directory: a sentence for each run, friction curve, sweep and study in it."""
     parts = {
         "measures.csv": _headline_of_run,
         "steady.csv": _headline_of_curve,

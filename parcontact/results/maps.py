@@ -1,6 +1,6 @@
 """Pictures of maps: panels, movies and lines.
 
-* Maps of saved instants: panels of one instant, and frames of all for movies and reports.
+* Maps of saved instants: panels of one instant, and frames of all instants for movies and reports.
 * Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path.
 * Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder.
 """
@@ -40,7 +40,7 @@ PRESSURE, TRACTION = Axis("pressure", "Pa"), Axis("traction", "Pa")
 
 
 def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[Panel]:
-    """Yield the panel of a narrow map, or of a surface that is a single round shape."""
+    """Yield the panel of pressure along a line, for a narrow map, or for a surface that is a single round shape."""
     shape = run.job.surface[0]
     if narrow:
         yield _make_strip(run, fields)
@@ -85,8 +85,8 @@ def _make_strip(run: PlottedRun, fields: Fields) -> Panel:
 
 
 def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
-    """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if they are saved. With a
-    coefficient of friction it has the bounds."""
+    """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if tractions are saved;
+    with their bounds if the job has a coefficient of friction."""
     lies = fields.x.size > fields.y.size
     along, place = ("x", fields.x) if lies else ("y", fields.y)
     traction, pressure = fields.read(f"traction_{along}"), fields.read("pressure")
@@ -138,7 +138,7 @@ Window = tuple[slice, slice]
 
 
 class Look(NamedTuple):
-    """Style of a map: its unit, its colours, and the colour of points without a value."""
+    """Style of a map: unit, colours, colour of points without a value, and a note."""
 
     unit: str
     colors: str
@@ -168,11 +168,11 @@ BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which po
 
 
 def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[Panel]], list[Panel]]:
-    """Return groups of panels, of pressures on a line and of wide maps, and panels of the other saved maps of one
-    instant, or of tractions on a line.
+    """Return groups of panels of pressures (on a line, and wide maps), and panels of the other saved maps, or of
+    tractions on a line, all at one instant.
 
-    The default instant is the last one; for contacts that end in detachment, the pull-off or the largest load. Raises
-    InputError if nothing is saved at the instant `at`.
+    The default instant is the last one; for contacts that end in detachment, the instant of the pull-off or of the
+    largest load. Raises InputError if nothing is saved at the instant `at`.
     """
     try:
         with run.open_maps() as file:
@@ -234,8 +234,10 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
 
 
 def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
-    """Return the sizes of tractions where there is pressure, and their ratios to the bound of traction, which are 1
-    where points slip. The bound is the coefficient times the pressure, or for a shear strength the largest traction."""
+    """Return a map of |traction| where there is pressure, and of its ratio to the bound, which is 1 where points slip.
+
+    The bound is the coefficient times the pressure, or for a shear strength the largest traction.
+    """
     touching, coefficient = pressure > 0.0, job.section("interface").coefficient
     bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
     share = np.divide(traction, bound, out=np.zeros_like(traction), where=bound > 0.0)
@@ -256,10 +258,10 @@ def _find_window(pressure: Array | None) -> Window:
 
 
 def find_range(values: Array) -> tuple[float, float]:
-    """Return the range of the colours; a few very high values do not extend it.
+    """Return the lowest and the highest value of the colour scale; a few very high values do not extend it.
 
-    It begins at 0 if no value is negative, and is symmetric if pressures have both signs. It is (inf, -inf) if no point
-    has a value.
+    The scale begins at 0 if no value is negative, and is symmetric if pressures have both signs. The result is (inf,
+    -inf) if no point has a value.
     """
     finite = values[np.isfinite(values)]
     if not finite.size:
@@ -296,7 +298,7 @@ def _along(values: Array) -> Array:
 
 
 def dataset_of(file: h5py.File, name: str) -> str:
-    """Return the name of the data set of a map in a file, '' if there is none; temperatures may have two names."""
+    """Return the name of a map's data set in a file, '' if there is none; temperatures may have two names."""
     return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
 
 
@@ -314,8 +316,8 @@ def draw_frames(
     size: tuple[float, float] = (4.5, 4.0),
     dpi: int = 110,
 ) -> Iterator[Image.Image]:
-    """Draw a saved map of shape (instant, y, x) at each index that has a label, with one range of colours. Only the map
-    and its title are drawn anew for each."""
+    """Draw a saved map of shape (instant, y, x) at each index in `labels`, with one colour scale. Only the map and its
+    title are drawn anew for each frame."""
 
     def read(index: int) -> Array:
         if name in STICK_MAPS:
@@ -365,10 +367,10 @@ FFMPEG, KINDS = "ffmpeg", (".gif", ".mp4")
 
 
 def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Path]:
-    """Write a movie of the map `name` over all saved instants, with one range of colours; returns the paths.
+    """Write a movie of the map `name` over all saved instants, with one colour scale; returns the paths.
 
-    Without `out` they are NAME.gif in the directory, and NAME.mp4 if ffmpeg exists. Raises InputError for another kind
-    of file, an MP4 without ffmpeg, and a map that was not saved.
+    Without `out` the files are NAME.gif in the directory, and NAME.mp4 if ffmpeg exists. Raises InputError for another
+    kind of file, an MP4 without ffmpeg, and a map that was not saved.
     """
     targets = [out] if out else [directory / f"{name}{kind}" for kind in KINDS if kind == ".gif" or _find_ffmpeg()]
     if targets[0].suffix not in KINDS:

@@ -45,8 +45,8 @@ BEYOND = "; more than the "  # in an estimate that exceeds numerics.accuracy
 
 @dataclass(frozen=True)
 class Log:
-    """Contents of a log: different warnings in order; sentences on errors and counts of the last run; lines on program
-    and machine."""
+    """Contents of a log: all different warnings in order; sentences on errors, and counts, of the last run; lines on
+    program and machine."""
 
     warnings: list[str]
     estimates: list[str]
@@ -66,7 +66,7 @@ def read_logs(directory: Path) -> Log:
 
 
 def warnings_of_cases(directory: Path) -> list[str]:
-    """Return the warnings in the logs of the cases of a sweep, and the errors beyond numerics.accuracy, each once with
+    """Return the warnings in the logs of a sweep's cases, and the errors that exceed numerics.accuracy, each once with
     its cases."""
     found: dict[str, list[int]] = {}
     for path in sorted(directory.glob(f"{CASES}/*")):
@@ -82,7 +82,7 @@ FRICTION = ERRORS[0]
 
 
 def costs(results: Results, found: Log, job: Job) -> Iterator[ReportSection]:
-    """Yield the errors of a run or a curve, then wall time, operator calls and counts."""
+    """Yield the sections on the errors of a run or a curve, and on wall time, operator calls and counts."""
     columns = results.table
     yield describe_errors(columns, found, job, results.kind == "curve")
     calls = [value for value in columns["operator_calls"] if value == value]
@@ -98,8 +98,9 @@ def costs(results: Results, found: Log, job: Job) -> Iterator[ReportSection]:
 
 
 def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job, of_curve: bool) -> ReportSection:
-    """Return the errors of a friction curve at its worst and best point, or of a run at its end, with the sentences of
-    its log; friction only if something slides. The section is empty for a table without errors."""
+    """Return the section on the errors of a friction curve at its worst and best point, or of a run at its end, with
+    the sentences of its log. Friction is left out if nothing slides. The section is empty for a table without
+    errors."""
     rows = []
     for column, name, asked in zip(ERRORS, ("friction", "contact area"), job.numerics.asked.both, strict=True):
         known = [error for error in columns.get(column, ()) if error == error]
@@ -112,7 +113,7 @@ def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job
 
 
 def origin_section(directory: Path, found: Log) -> ReportSection:
-    """Return the provenance by the newest file of a directory that has it."""
+    """Return the section on provenance, from the newest file of a directory that states it."""
     there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     for path in there:
@@ -137,7 +138,7 @@ def origin_section(directory: Path, found: Log) -> ReportSection:
 
 
 def list_citations(job: Job | None) -> ReportSection:
-    """Return the references to cite for the results of a job."""
+    """Return the section with the references to cite for a job's results."""
     return ReportSection(
         "References to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())]
     )
@@ -158,7 +159,7 @@ ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys t
 
 
 def describe_directory(directory: Path) -> Chapter:
-    """Return the chapter about a directory. Raises InputError if it has no results."""
+    """Return the chapter of a report about a directory. Raises InputError if it has no results."""
     results = Results(directory)
     there = [kind for kind in results.kinds if kind in SHOWN]
     if not there:
@@ -280,11 +281,11 @@ def render(directories: Sequence[Path]) -> str:
 
 
 def breakable(text: str, mark: str = "<wbr>") -> Markup:
-    """Return a text whose long words may be broken after `_./,=:` only; browsers would break 1e-05 at its hyphen."""
+    """Return a text whose long words may be broken only after `_./,=:`; browsers would break 1e-05 at its hyphen."""
     parts = LONG_WORD.sub(lambda word: BREAKS.sub(mark, word[0]), str(escape(text)))
     return Markup(SMALL_NUMBER.sub(r'<span class="n">\g<0></span>', parts))
 
 
 def whole_numbers(text: str) -> str:
-    """Return a sentence without line breaks between a number, its error and its unit."""
+    """Return a sentence in which no line break separates a number, its error and its unit."""
     return NUMBER.sub("\N{NO-BREAK SPACE}", text)

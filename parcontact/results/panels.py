@@ -1,6 +1,7 @@
-"""Panels of pictures: their numbers, and how they are drawn.
+"""Panels of pictures: what they contain, and how they are drawn.
 
-A picture is a list of panels, which `draw` draws: lines with errors, stacks of bars, shaded ranges, a map."""
+A picture is a list of panels, which `draw` draws: lines with errors, stacks of bars, shaded ranges, a map.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,8 +36,11 @@ TICKS = 5  # most intervals of ticks of a bar of colours
 
 @dataclass(frozen=True)
 class Line:
-    """A line: its name (or ''), values in SI units, and their relative errors if known; or bars, which stand on those
-    before in the same `stack`. A line without values is an entry of the legend only."""
+    """A line, or bars, of a panel: name (or ''), values in SI units, and their relative errors if known.
+
+    Bars stand on the bars before them with the same `stack` number. A line without values is only an entry of the
+    legend.
+    """
 
     name: str
     x: Array
@@ -56,7 +60,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class ColumnPanel:
-    """A panel of a table, before its rows and its horizontal axis are chosen: `columns` by the names of their lines."""
+    """A panel of a table before its rows and horizontal axis are chosen: `columns` by the names of their lines."""
 
     key: str
     y: Axis
@@ -64,13 +68,14 @@ class ColumnPanel:
 
 
 def offered(name: str) -> list[ColumnPanel]:
-    """Return the panels of columns that capabilities add under a name: RUN_PANELS, CURVE_PANELS, ..."""
+    """Return the panels of columns that effects add under a `name`: RUN_PANELS, CURVE_PANELS, ..."""
     return [one for found in answers("pictures", name) for one in found]
 
 
 @dataclass(frozen=True)
 class Shade:
-    """A shaded range of an axis, x or y, with its name in the legend. All but the first begin at a dotted line."""
+    """A shaded range of an axis, x or y, with its name in the legend. All ranges but the first begin at a dotted
+    line."""
 
     name: str
     low: float
@@ -82,7 +87,7 @@ class Shade:
 @dataclass(frozen=True)
 class Colors:
     """A map of `values`, shape (ny, nx), between the `ends` x0, x1, y0, y1 [m] of its box, in colours from `low` to
-    `high`; there is no bar of colours if `low` is larger. Points without a value, NaN, are `blank`, or have the grey
+    `high`; if `low` exceeds `high`, there is no colour bar. Points without a value, NaN, are `blank`, or have the grey
     shade of the map `behind`. `clipped`: higher values have the last colour."""
 
     values: Array
@@ -99,12 +104,12 @@ class Colors:
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel, chosen by its `key`: `series` over `x`, on a map of `colors` if there is one.
+    """A panel of a picture, chosen by its `key`: lines `series` against the axis `x`, on a map of `colors` if there is
+    one.
 
-    `spikes`: a spike at the beginning may be cut off.
-    `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. `edges` [m] are the
-    longest and shortest waves of the bands of stacked bars, from the longest on, for a bar of colours. `x_range` and
-    `y_range` are limits of the axes.
+    `spikes`: a spike at the beginning may be cut off. `peak`: the legend names the highest point. `zeros`: label of
+    values of 0 on a logarithmic axis. `edges` [m] are the wavelengths between the bands of stacked bars, from the
+    longest down, for a colour bar. `x_range` and `y_range` are limits of the axes.
     """
 
     key: str
@@ -126,8 +131,7 @@ class Panel:
 
 
 def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a panel without its legend; `log` names its logarithmic axes, which are linear if there is no point for
-    them."""
+    """Draw a panel without its legend. `log` names logarithmic axes, which are linear without positive points."""
     log_x, log_y = (
         "none" not in log and (panel.log_x or "x" in log),
         "none" not in log and bool(panel.log_y or panel.zeros or "y" in log),
@@ -185,7 +189,7 @@ def _draw_shades(axes: Axes, shades: Sequence[Shade]) -> None:
 
 
 def show_colors(axes: Axes, one: Colors) -> AxesImage:
-    """Draw a map with its bar of colours. The scale of a single value has one tick."""
+    """Draw a map with its colour bar. The scale of a single value has one tick."""
     axes.set_facecolor(one.blank)
     axes.grid(False)
     if one.behind is not None:
@@ -221,7 +225,7 @@ def _show(axes: Axes, one: Colors, values: Array, **look: Any) -> AxesImage:
 
 
 def drawn_points(values: Array) -> Array:
-    """Return the points of a map that are drawn: at most COARSEST along a side."""
+    """Return the points of a map that are drawn, thinned to at most COARSEST along a side."""
     step = max(1, -(-max(values.shape) // COARSEST))
     return values[::step, ::step]
 
@@ -281,7 +285,7 @@ def _draw_errors(axes: Axes, one: Line, share: Array) -> None:
 
 
 def set_scale(axes: Axes, which: str, of: Axis, log: bool) -> None:
-    """Set name, unit and scale of an axis, with few ticks so that labels do not overlap."""
+    """Set name, unit and scale of an axis; few ticks keep labels from overlapping."""
     axis, few = axes.xaxis if which == "x" else axes.yaxis, True
     if log:
         low, high = axis.get_data_interval()
@@ -337,6 +341,6 @@ def _name_peak(axes: Axes, one: Line, unit: str) -> None:
 def picture(
     title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Panel] = (), log: Sequence[str] = ()
 ) -> Figure:
-    """Return a picture of groups of panels below each other, then `maps`, all of one size."""
+    """Return a picture with groups of panels below each other, then `maps`, all of one size."""
     drawn = [[partial(draw, panel, log=log) for panel in group] for group in (*groups, maps)]
     return style.figure_of(title, drawn[:-1], drawn[-1])

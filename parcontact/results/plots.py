@@ -1,7 +1,8 @@
 """Pictures of runs, also unfinished ones, and of friction curves: panels, and maps of one instant.
 
-The job determines the panels: friction if the surface slides, energies if they were requested, curves over the load if
-all stages are single solves, pressures along a line with Hertz's for a sphere."""
+The job determines the panels: friction if the surface slides, energies if they were requested, curves against the load
+if all stages are single solves, and for a sphere pressures along a line with Hertz's solution.
+"""
 
 import itertools
 import os
@@ -32,8 +33,10 @@ FAILED_CASES = 3  # most failed cases that a picture names
 
 @dataclass(frozen=True)
 class PlotOptions:
-    """Options of a picture; '' and () mean: chosen by the contents of the directories. `out` is a file, `at` a step or
-    a time [s] of the maps."""
+    """Options of a picture. Options that are '' or () are chosen by the contents of the directories.
+
+    `out` is a file, `at` a step or a time [s] of the maps.
+    """
 
     format: str = ""
     panels: Sequence[str] = ()
@@ -60,12 +63,12 @@ class PlotOptions:
         return not self.panels or key in self.panels
 
     def choose(self, found: Sequence[Panel]) -> list[Panel]:
-        """Return the requested panels in the requested order."""
+        """Return the requested panels out of `found`, in the requested order."""
         return [panel for name in self.panels for panel in found if panel.key == name] if self.panels else list(found)
 
 
 def group(found: Sequence[Panel]) -> list[list[Panel]]:
-    """Return the panels of a curve, and those of its bands."""
+    """Return two groups: the panels of a curve, and the panels of its bands."""
     bands = [panel.key.startswith("bands") for panel in found]
     return [
         [panel for panel, of_bands in zip(found, bands, strict=True) if of_bands == which] for which in (False, True)
@@ -73,7 +76,7 @@ def group(found: Sequence[Panel]) -> list[list[Panel]]:
 
 
 def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Path]:
-    """Draw each directory, or compare all in one picture; returns the paths of the pictures.
+    """Draw each directory, or compare all directories in one picture; returns the paths of the pictures.
 
     Raises InputError if there is nothing to draw.
     """
@@ -88,7 +91,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 
 
 def draw_steady(table: Path) -> Path:
-    """Draw steady.csv into its directory; returns the path of the picture."""
+    """Draw a table steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
         title = "\n".join([band_charts.steady_title(table.parent), *_name_missing(table.parent)])
         return _save(picture(title, group(band_charts.panels_of_curve(table.parent))), table.with_suffix(""))
@@ -167,7 +170,7 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
 
 
 def compare_panels(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
-    """Return the panels that at least `least` directories have, with the lines of all."""
+    """Return the panels that at least `least` directories have, each with the lines of all directories."""
     found = [_find_panels(directory, options) for directory in directories]
     return compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
 
@@ -182,7 +185,7 @@ def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
 
 
 def name_directories(directories: Sequence[Path]) -> list[str]:
-    """Return labels of directories: the swept keys of cases of one sweep, else the last parts of paths that differ."""
+    """Return a label for each directory: the swept keys for cases of one sweep, else the parts of paths that differ."""
     if named := _name_cases(directories):
         return named
     paths = [directory.absolute() for directory in directories]
@@ -212,8 +215,11 @@ def _name_value(key: str, value: Any) -> str:
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
-    """Return the panels that at least `least` of several runs have. The colour is the run; the lines of each run have
-    marks, and bands are shares of its bar. If no run has several lines in a panel, each has its own dashes."""
+    """Return the panels that at least `least` of several runs have, with the lines of all runs.
+
+    Each run has one colour; its lines have marks, and bands are shares of its bar. If no run has several lines in a
+    panel, each run has dashes instead.
+    """
     found: dict[tuple[str, Axis, Axis], list[tuple[int, Panel]]] = {}
     for number, (_, panels) in enumerate(runs):
         for panel in panels:

@@ -27,7 +27,7 @@ NEAREST = 3  # number of nearest steps with maps in a message
 
 
 class PlottedRun(Results):
-    """The job and the rows of a run, without the unloaded rows at the beginning."""
+    """The job and the rows of a run for pictures, without the unloaded rows at the beginning."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(directory, "run")
@@ -51,12 +51,12 @@ class PlottedRun(Results):
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        """Return the contact area corrected for cells at its edges."""
+        """Return the axis and the values of the contact area, corrected for cells at its edges."""
         return to_contact_area(self.columns["contact_area_corrected"], self.area * self.free)
 
     @property
     def backwards(self) -> bool:
-        """Return True if the surface moves along x only and reverses, where the magnitude of friction would have a
+        """Return True if the surface moves along x only and reverses; the magnitude of friction would then have a
         cusp."""
         velocities = [stage.velocity for stage in self.job.history]
         turns = any(stage.speed and not stage.slides for stage in self.job.history)
@@ -64,24 +64,24 @@ class PlottedRun(Results):
 
     @property
     def curves(self) -> bool:
-        """Return True if there is more than one solve, so that there is a history to draw."""
+        """Return True if there is more than one solve, so that curves can be drawn."""
         return bool(self.lasts) or len(set(self.columns["pressure"])) > 1
 
     @cached_property
     def timeline(self) -> Timeline:
-        """Return the stage of each step."""
+        """Return the timeline of the run, which states the stage of each step."""
         steps, times = self._all["step"].astype(int).tolist(), self._all["time"].tolist()
         return Timeline.from_job(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def telling_step(self) -> int:
-        """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
-        of the largest load."""
+        """Return the step whose maps show the contact best: the last one, or after a detachment the step of the
+        pull-off or of the largest load."""
         return int(self._all["step"][self.telling_row])
 
     @property
     def rows_of_stages(self) -> dict[int, list[int]]:
-        """Return the rows of each stage, by its index; the initial state belongs to the first stage."""
+        """Return the row numbers of each stage, by its index; the initial state belongs to the first stage."""
         found: dict[int, list[int]] = {}
         for row, step in enumerate(self.columns["step"].astype(int).tolist()):
             if (stage := self._stage(step)) >= 0:
@@ -99,7 +99,7 @@ class PlottedRun(Results):
         return ", ".join(filter(None, (when, self.pressed(step))))
 
     def pressed(self, step: int) -> str:
-        """Return the load after a step as text, as its stage prescribes it; '' if the step has no row."""
+        """Return the load after a step as text, in the quantity that its stage prescribes; '' without a row."""
         rows, stage = np.flatnonzero(self._all["step"] == step), self._stage(step)
         if not rows.size:
             return ""
@@ -115,7 +115,7 @@ class PlottedRun(Results):
         return "" if name == f"stage {stage + 1}" else name
 
     def moved(self, step: int) -> tuple[float, float]:
-        """Return the position of the surface after a step [m]; the initial one if the job does not have this step."""
+        """Return the position of the surface after a step [m]; the initial position for a step that the job lacks."""
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
@@ -160,7 +160,7 @@ class Fields(SavedFields):
 
 
 def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
-    """Return at most `count` evenly spaced instants, including the first and the last."""
+    """Return at most `most` of the labelled instants, evenly spaced, including the first and the last."""
     indices = list(labels)
     kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
     return {indices[k]: labels[indices[k]] for k in kept}
@@ -173,7 +173,7 @@ def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
 
 
 def round_digits(values: Array) -> Array:
-    """Return values rounded to DIGITS digits, so that values that differ by rounding are equal."""
+    """Return values rounded to DIGITS digits, so that values that differ only by rounding become equal."""
     return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
@@ -183,10 +183,10 @@ def count_different(values: Array) -> int:
 
 
 def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
-    """Return the load: the force on the box of a free scene of `area` [m^2], else the mean pressure."""
+    """Return axis and values of the load: the force on a free box of this `area` [m^2], else the mean pressure."""
     return (Axis("force", "N"), pressure * area) if area else (Axis("pressure", "Pa"), pressure)
 
 
 def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
-    """Return the contact area of a free scene, whose box has this area, else the nominal fraction."""
+    """Return axis and values of the contact: its area for a free box of this `area` [m^2], else its nominal share."""
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)

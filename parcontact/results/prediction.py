@@ -51,10 +51,10 @@ class PredictedInstant(NamedTuple):
 
 
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[PredictedInstant]:
-    """Yield the rows for a job, the initial state first; `slab` must have one rank.
+    """Yield the predictions for a job, one for each instant, the initial state first; `slab` must have one rank.
 
-    The waves represent the job's spectrum on an unbounded surface (`continuum`), or its heights in the box
-    (`lattice`). Stages that choose their steps have the steps of the run in the job's directory; before a run, steps
+    The waves represent the job's spectrum on an unbounded surface (`continuum`), or its heights in the box (`lattice`).
+    For stages that choose their steps, instants are the steps of the run in the job's directory; before a run, steps
     double up to one cell (`job.history`). Raises InputError for jobs outside the theory.
     """
     _refuse_unknown(job)
@@ -76,7 +76,7 @@ def _times_of_run(job: Job) -> dict[int, float]:
 
 
 class SteadyInstant(NamedTuple):
-    """One row of steady_theory.csv [m/s, Pa, deg C (NaN: that of the job), -, -, -]."""
+    """One row of steady_theory.csv [m/s, Pa, deg C (NaN: the job's temperature), -, -, -]."""
 
     velocity: float
     pressure: float
@@ -87,7 +87,7 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Return whether the theory is for a job and does not need its heights: in bands, or with one rough surface."""
+    """Return True if the theory applies to a job and does not need its heights: in bands, or with one rough surface."""
     if _why_forbidden(job):
         return False
     if job.bands is not None:
@@ -106,8 +106,8 @@ def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
 def predict_steady(
     job: Job, wanted: Request, gamma: float = persson.GAMMA, shortest: float = 0.0
 ) -> Iterator[SteadyInstant]:
-    """Yield the steady states of a curve for the spectrum of the job on an unbounded surface; for bands without waves
-    below the `shortest` [m]. Raises InputError for jobs outside the theory."""
+    """Yield the predicted states of a friction curve for the job's spectrum on an unbounded surface. In bands, waves
+    below `shortest` [m] are left out. Raises InputError for jobs outside the theory."""
     rings = _on_body(job, _continuum(job, 0.0, shortest))
     _, kx, ky = rings.waves
     for speed, pressure, temperature in wanted.points:
@@ -121,8 +121,8 @@ def predict_steady(
 
 
 class BandInstant(NamedTuple):
-    """One row of bands_theory.csv [m/s, Pa, deg C (NaN: that of the job)]: number of the band, its wavelengths [m],
-    friction of its waves, and the share in contact at its shortest wave."""
+    """One row of bands_theory.csv [m/s, Pa, deg C (NaN: the job's temperature)]: number of the band, wavelengths [m],
+    friction of the band's waves, and the share in contact at its shortest wave."""
 
     velocity: float
     pressure: float
@@ -135,7 +135,7 @@ class BandInstant(NamedTuple):
 
 
 def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
-    """Yield friction and area of each band of a job, as the increment by its waves."""
+    """Yield friction and area of each band of a job: friction is the increment by the band's waves."""
     cut = cut_bands(job)
     rows = dict[Wanted, list[SteadyInstant]]()
     for number in range(cut.count):
@@ -149,7 +149,7 @@ def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
 
 
 def write_steady(job: Job, wanted: Request) -> SteadyInstant:
-    """Write steady_theory.csv for a curve. Return the point of the highest friction."""
+    """Write the predictions of a friction curve to steady_theory.csv. Return the point of the highest friction."""
     rows = list(predict_steady(job, wanted))
     if job.bands is not None:
         _write(job.output.directory / BANDS_FILE, BANDS_THEORY, predict_bands(job, wanted))
@@ -158,7 +158,7 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
 
 
 def draw_curve(job: Job, wanted: Request) -> Path:
-    """Draw the curve of a job, with the theory if it needs no heights. Return the path of the picture."""
+    """Draw the friction curve of a job, with the theory if it needs no heights. Return the path of the picture."""
     if has_spectrum(job):
         write_steady(job, wanted)
     return _draw(job)
@@ -171,8 +171,8 @@ def _draw(job: Job) -> Path:
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
-    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences about it,
-    compared with the job's run if there is one."""
+    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences that compare
+    the predictions with the job's run if there is one."""
     files.refuse_pipes(job.output.directory)
     settings = TheorySettings(gamma, waves)
     if not job.history:
@@ -201,7 +201,7 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
 
 
 def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
-    """Write the rows of a job as theory.csv, with theory.yaml. Return the path of the table."""
+    """Write the predictions for a job to theory.csv, with theory.yaml. Return the path of the table."""
     return _write(job.output.directory / theory_table.TABLE, THEORY, rows, settings)
 
 
@@ -290,7 +290,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
 
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
-    """Return a measured spectrum without waves longer than the box or shorter than two cells of the grid."""
+    """Return the rings of a measured spectrum, without waves longer than the box or shorter than two cells."""
     from ..job import measured_maps
 
     found, (long, short) = measured_maps.read_spectrum(part)

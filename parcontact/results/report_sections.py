@@ -1,9 +1,4 @@
-"""Sections of a report.
-
-* Sections on results of a run, a friction curve, a sweep or a study, with browsers of their maps.
-* The section on the rigid surface of a job.
-* The section on the material: moduli, branches, temperature shift, and the excited frequencies.
-"""
+"""Sections of a report: results of a run, friction curve, sweep or study with maps; the rigid surface; the material."""
 
 import io
 import math
@@ -68,7 +63,7 @@ MAP_SIZE = (4.2, 3.5)  # size of the picture of a map [inch]
 
 
 def describe_run(directory: Path) -> ReportSection:
-    """Return the section on a run: histories, extreme and last values, and maps over time."""
+    """Return the section on a run: histories, extreme and last values, and maps at saved instants."""
     run = PlottedRun(directory)
     columns = run.table
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
@@ -110,8 +105,8 @@ def describe_curve(directory: Path) -> ReportSection:
 
 
 def describe_friction(directory: Path) -> ReportSection:
-    """Return the first section on a friction curve: friction over speed and temperature, what is not solved and why,
-    and the lengths, frequencies and moduli that matter."""
+    """Return the first section on a friction curve: friction by speed and temperature, unsolved points and why, and the
+    lengths, frequencies and moduli that matter."""
     curve = Results(directory, "curve")
     sentences = [f"The curve has {curve.lost}."] if curve.lost else []
     sentences += [f"{text[:1].upper()}{text[1:]}." for text in curve.unfinished if text != curve.lost]
@@ -190,7 +185,7 @@ def format_cell(value: object) -> str:
 
 
 def browse_run(run: PlottedRun) -> list[Browser]:
-    """Return browsers of all saved maps of a run over time."""
+    """Return browsers of all saved maps of a run, which step through time."""
     return _browse_file(run, MAPS, partial(label_frames, run), run.job, run.telling_step)
 
 
@@ -240,8 +235,8 @@ MOST_POINTS = 2**22  # most points of a surface that is computed for a report
 
 
 def road_section(job: Job) -> ReportSection:
-    """Return the section on the surface of a job, computed again; if its files no longer exist or it is too large, its
-    keys only."""
+    """Return the section on the surface of a job, computed again; only its keys if its files are gone or it is too
+    large."""
     shapes = ReportTable(
         ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
     )

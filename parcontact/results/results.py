@@ -1,6 +1,7 @@
-"""Results of an output directory: job, tables with units, maps, errors, cases, and what is unfinished.
+"""Results in an output directory: job, tables with units, maps, errors, cases, and what is unfinished.
 
-Pictures, texts, tables of sweeps and `parcontact.open` read results through this module only."""
+Pictures, texts, tables of sweeps and `parcontact.open` read results through this module only.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ Rows = list[dict[str, Any]]
 
 
 class ResultTable(Columns):
-    """Columns of a table by name; a missing column raises InputError."""
+    """Columns of a table by name; access to a missing column raises InputError."""
 
     @property
     def units(self) -> dict[str, str]:
@@ -79,10 +80,10 @@ class ResultTable(Columns):
 
 
 class Results:
-    """Results in a directory of a `kind`: run, curve, sweep, study or leak; by default the first of these that exist.
+    """Results in a directory, of a `kind`: run, curve, sweep, study or leak; by default the first kind that exists.
 
-    A `job` that is given, and how its surfaces `detached`, are taken in place of what is stored. Tables, maps and job
-    are read when they are used, and raise InputError if they are damaged.
+    A given `job`, and a text on how the surfaces `detached`, replace what is stored. Tables, maps and job are read when
+    they are used, and raise InputError if they are damaged.
     """
 
     def __init__(self, path: str | Path, kind: str = "", job: Job | None = None, detached: str = "") -> None:
@@ -95,13 +96,13 @@ class Results:
         return (self.path / name).is_file()
 
     def read(self, name: str) -> ResultTable:
-        """Return a table by the name of its file; without the file, an empty one."""
+        """Return a table by the name of its file; an empty table if the file does not exist."""
         found = tables.read_results(self.path / name) if self.has(name) else {}
         return ResultTable(self.path / name, found.items())
 
     @cached_property
     def table(self) -> ResultTable:
-        """Columns of the results of the kind, with units; of a sweep, its columns of numbers."""
+        """Table of the results of this kind, with units; of a sweep, the columns that are numbers."""
         if self.kind != "sweep":
             return self.read(KINDS[self.kind])
         rows = self.cases
@@ -110,7 +111,7 @@ class Results:
 
     @cached_property
     def job(self) -> Job | None:
-        """Job of the results, with flat shapes in place of files; None if none is stored."""
+        """Job of the results, with flat shapes in place of files; None if no job is stored."""
         if self._job is not None:
             return self._job
         wanted = {"curve": (STEADY_RESOLVED, RESOLVED), "sweep": self._jobs_of_cases}.get(self.kind)
@@ -124,19 +125,19 @@ class Results:
 
     @property
     def job_file(self) -> Path | None:
-        """Path of the resolved job, of a sweep that of its first case; None if there is none."""
+        """Path of the stored job with all defaults; of a sweep, the job of the first case; None if there is none."""
         return next((self.path / name for name in (*JOBS.values(), *self._jobs_of_cases) if self.has(name)), None)
 
     @property
     def title(self) -> str:
-        """Title of the job; a text that says so without one."""
+        """Title of the job; a text that says so if it has none."""
         if (path := self.job_file) is None:
             return "without a job"
         found = re.search(r"^title: (.+)$", path.read_text(errors="replace"), re.MULTILINE)
         return (found and found.group(1).strip("'\"")) or "without a title"
 
     def plain_job(self) -> dict[str, Any]:
-        """Return the stored job of a run or a curve as plain data; raises InputError without one."""
+        """Return the stored job of a run or a curve as plain data; raises InputError if there is none."""
         found = next((self.path / name for name in (RESOLVED, STEADY_RESOLVED) if self.has(name)), None)
         if found is None:
             raise InputError(f"{self.path} has no run: it has neither {RESOLVED} nor {STEADY_RESOLVED}")
@@ -144,7 +145,7 @@ class Results:
 
     @property
     def temperature(self) -> float:
-        """Temperature of the rubber [deg C], by the job or the reference of its shift; NaN without a shift."""
+        """Temperature of the rubber [deg C] from the job, or its shift's reference temperature; NaN without a shift."""
         body = self.job.material.fitted if self.job else None
         if not isinstance(body, Zener) or body.shift is None:
             return math.nan
@@ -152,23 +153,23 @@ class Results:
 
     @property
     def free_area(self) -> float:
-        """Area [m^2] of the box of a free scene; 0 of any other scene, and without a job."""
+        """Area [m^2] of a free box; 0 for other boxes, and without a job."""
         job = self.job
         return job.grid.lx * job.grid.ly if job and job.grid.boundary == "free" else 0.0
 
     @property
     def claims(self) -> dict[str, Claim]:
-        """Claims of the verbs that wrote the directory, by verb."""
+        """Records of the commands that wrote the directory (`files.tables.Claim`), by verb."""
         return tables.sound_claims(self.path)
 
     @cached_property
     def detached(self) -> str:
-        """The way in which the surfaces of a run detached for good, as text; '' if they did not."""
+        """Text on how the surfaces of a run detached for good; '' if they did not."""
         return self._detached or tables.detached(self.path)
 
     @property
     def telling_row(self) -> int:
-        """Row that shows the contact of a run: the last one; after a detachment the row that a capability names, else
+        """Row that shows the contact of a run best: the last one; after a detachment the row that an effect names, else
         the last row of the largest load."""
         pressure, area = (np.asarray(self.table[name], float) for name in ("pressure", "contact_area"))
         if area[-1] > 0.0 and not self.detached:
@@ -178,7 +179,7 @@ class Results:
 
     @property
     def errors(self) -> dict[str, list[float]]:
-        """Known relative errors of friction and contact area, by column."""
+        """Known relative errors of friction and contact area, by the names of their columns."""
         return {name: [error for error in self.table[name] if error == error] for name in ERRORS if name in self.table}
 
     @cached_property
@@ -188,7 +189,7 @@ class Results:
 
     @property
     def points(self) -> Path:
-        """Path of the table of a sweep with its results: of its cases, or of the points of its curves."""
+        """Path of the table with the results of a sweep: of its cases, or of the points of its curves."""
         known = any(math.isfinite(row.get("residual", math.nan)) for row in self.cases)
         return self.path / (CURVES if self.has(CURVES) and not known else KINDS["sweep"])
 
@@ -203,7 +204,7 @@ class Results:
 
     @property
     def sentences_of_study(self) -> list[str]:
-        """Sentences of a study; none before it is finished."""
+        """Sentences on a study; empty before it is finished."""
         if not self.has("study.txt"):
             return []
         tables.refuse_cut(self.path / "study.txt")
@@ -211,7 +212,7 @@ class Results:
 
     @property
     def unfinished(self) -> list[str]:
-        """The missing results with reasons: points of a curve, cases of a sweep, steps of a run."""
+        """Sentences on missing results with reasons: points of a curve, cases of a sweep, steps of a run."""
         if self.kind == "sweep":
             return [*self.failed_cases(), *self._cases_to_go()]
         return list(self._lost_points() if self.kind == "curve" else self._steps_to_go())
@@ -236,7 +237,7 @@ class Results:
             yield "the run is not finished"
 
     def failed_cases(self, most: int = 10**9) -> list[str]:
-        """Return sentences on the failed cases of a sweep, at most `most` and one on the number of others."""
+        """Return sentences on at most `most` failed cases of a sweep, and one on the number of others."""
         failed = [int(row["case"]) for row in self.cases if row["state"] == "failed"]
         found = [": ".join(filter(None, (f"case {one} failed", self._why_failed(one)))) for one in failed[:most]]
         return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
@@ -250,7 +251,7 @@ class Results:
 
     @property
     def lost(self) -> str:
-        """Text on the lost points of a curve; '' if there is none."""
+        """Text on the points of a curve that could not be solved; '' if there are none."""
         return tables.name_lost(self.path)
 
     def open_maps(self, name: str = MAPS) -> h5py.File:
@@ -267,8 +268,8 @@ class Results:
 
     @property
     def maps(self) -> xarray.Dataset:
-        """Saved maps of a run, read when used: `pressure_map`, ..., of shape (t, y, x), with the coordinates `t` [s],
-        `map_step`, `y` and `x` [m]. Raises ImportError without xarray."""
+        """Saved maps of a run, read when they are used: `pressure_map`, ..., of shape (t, y, x), with the coordinates
+        `t` [s], `map_step`, `y` and `x` [m]. Raises ImportError without xarray."""
         try:
             import xarray
         except ImportError as error:
@@ -298,7 +299,7 @@ class Results:
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """Columns of a run along `step`, with the coordinate `time` [s], and its maps."""
+        """Columns of a run along `step`, with the coordinate `time` [s], and the saved maps."""
         maps, known = self.maps, {column.name for column in MEASURES}
         units = {
             name: {"units": unit or "1"} if unit or name in known else {} for name, unit in self.table.units.items()
@@ -321,12 +322,12 @@ class Results:
         return ""
 
     def highest(self) -> int:
-        """Return the row of the highest friction of a curve with points."""
+        """Return the row of the highest friction of a curve that has points."""
         return max(range(len(self.table["friction"])), key=self.table["friction"].__getitem__)
 
     def describe_place(self, row: int) -> str:
-        """Return speed, pressure and known temperature of a point of a curve as text, and whether the curve still rises
-        there at the end of its velocities."""
+        """Return a text with speed, pressure and known temperature of a point of a curve, and with a remark if the
+        curve still rises there at the end of its velocities."""
         columns = self.table
         places = [
             {name: columns[name][k] for name in PLACES if name in columns} for k in range(len(columns["velocity"]))
@@ -345,8 +346,8 @@ def _close(one: float, other: float) -> bool:
 
 
 def describe_end(best: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
-    """Return a text that friction still rises where the row of the highest friction is at the end of at least three
-    values of a key; else ''."""
+    """Return a text: friction still rises at the end of the values of a key. '' unless the row `best` of the highest
+    friction is at the end of at least three values."""
     found = dict[str, None]()
     for key in keys:
         values = sorted({row[key] for row in rows if isinstance(row[key], float) and row[key] == row[key]})
@@ -389,7 +390,7 @@ def swept_keys(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 class ExportedTable(NamedTuple):
-    """A table with the stem of the name of its file, its columns with units, and sentences on what it lacks."""
+    """A table for other programs: stem of its file name, columns with units, rows, and sentences on what it lacks."""
 
     name: str
     head: Sequence[str]

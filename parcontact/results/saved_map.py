@@ -13,7 +13,7 @@ from xarray.core.indexing import ExplicitIndexer, IndexingSupport, explicit_inde
 
 
 class SavedMap(BackendArray):
-    """The instants `saved` of a map of shape (t, y, x)."""
+    """A map of shape (t, y, x) in a field file, restricted to the instants `saved`."""
 
     def __init__(
         self, path: Path, name: str, shape: tuple[int, int, int], dtype: np.dtype[Any], saved: NDArray[np.intp]

@@ -1,9 +1,10 @@
 """Results of a slide: its highest friction, its dynamic friction, and its contact area.
 
-The slide of a history is its last part at one non-zero velocity, over all stages with it. As in the paper (Sec. 3.1),
-mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady
-sliding may need a longer slide (`parcontact steady` solves it directly). Rows in which the box cuts the contact off do
-not count. Without them the slide is not whole, so that no errors are known."""
+The slide of a history is its last part at one non-zero velocity, which may extend over several stages. As in the paper
+(Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its
+distance. Steady sliding may need a longer slide (`parcontact steady` solves it directly). Rows in which the contact
+reaches the edge of the box do not count. The slide is then incomplete, so that no errors are known.
+"""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,10 +27,11 @@ CUT_OFF = "cut_off"
 
 
 class Slide(NamedTuple):
-    """`mu_max` and its distance [m] from the start of the slide; means over the last three quarters of the slide.
+    """Results of a slide: `mu_max` and its distance [m] from the start of the slide; means over the last three quarters
+    of it.
 
-    Friction is NaN if it is undefined (steps without load), the corrected area if it is unknown, and all of them if the
-    box cuts the contact off from the start.
+    Friction is NaN if it is undefined (steps without load), the corrected area is NaN if it is unknown, and all numbers
+    are NaN if the contact reaches the edge of the box from the start.
     """
 
     mu_max: float
@@ -40,7 +42,7 @@ class Slide(NamedTuple):
 
 
 def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC) -> float:
-    """Return the mean of values over the last `share` of a distance, by trapezoids; both have shape (n,)."""
+    """Return the mean of `values` over the last `share` of a `distance`, by trapezoids; both arrays have shape (n,)."""
     x, y = np.asarray(distance, float), np.asarray(values, float)
     start = x[-1] - share * (x[-1] - x[0])
     inside = x > start
@@ -52,7 +54,7 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
     """Return results of the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its
     rows, and `contact_area_corrected` if present.
 
-    None if nothing slides, or has slid yet.
+    Returns None if nothing slides, or has slid yet.
     """
     every = _during(history, columns)
     rows = _inside(columns, every)
@@ -101,8 +103,8 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
 
 
 def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row
-    without a slide, by existing columns; NaN if unknown."""
+    """Return the largest relative errors of friction and contact area in the rows of the slide, by the names of
+    existing columns; without a slide, the errors in the last row; NaN if unknown."""
     rows = _during(history, columns)[1:].tolist() if measure_slide(history, columns) else [-1]
     if _cuts(columns, rows):
         return {name: math.nan for name in ERRORS if name in columns}
@@ -110,9 +112,9 @@ def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]
 
 
 def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the mean relative errors of friction and contact area over the distance slid, as printed at the end of a
-    run; errors of friction are weighted by friction. Without a slide, the error of the area in the last row; NaN if
-    unknown."""
+    """Return the relative errors of friction and contact area, as means over the distance slid, which are printed at
+    the end of a run. Errors of friction are weighted by friction. Without a slide, the area's error in the last row;
+    NaN if unknown."""
     if measure_slide(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
     rows, found = _during(history, columns), dict[str, float]()
@@ -132,8 +134,8 @@ def largest(values: Iterable[float]) -> float:
 
 
 def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
-    """Return the friction in row `at` minus its mean over one cell [m] around it, 0 for steps of a cell or more and in
-    the first cell of the slide, where friction rises.
+    """Return by how much the friction in row `at` exceeds its mean over one cell [m] around it; 0 for steps of a cell
+    or more, and in the first cell of the slide, where friction rises.
 
     Steps shorter than a cell meet the points of the grid in turn, which makes friction oscillate.
     """
@@ -156,8 +158,7 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
 def mean_of_slide(
     columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str
 ) -> tuple[float, float]:
-    """Return the mean of a column over the last three quarters of a slide, and the mean of its errors, 0 where they are
-    not known."""
+    """Return the mean of a column over the last three quarters of a slide, and of its errors, unknown ones as 0."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
     return mean_over_end(distance, values), mean_over_end(distance, within)
@@ -168,7 +169,7 @@ def describe_slide(
 ) -> Iterator[str]:
     """Yield sentences on the slide so far, from columns of the run; none before anything slides.
 
-    `cell` is the spacing of the grid along x [m]. Until the last slide begins, the sentences are about the one before.
+    `cell` is the spacing of the grid along x [m]. Until the last slide begins, sentences are about the one before.
     """
     last, begun = _slide(history), _begun(history, columns["time"])
     not_begun = begun <= last.start

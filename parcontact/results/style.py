@@ -1,7 +1,7 @@
 """Style and units of pictures.
 
 * Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers.
-* Units of axes with the prefix that suits their numbers: 1.04 kPa, not 0.00104167 MPa.
+* Units of axes with a prefix that suits the numbers: 1.04 kPa, not 0.00104167 MPa.
 """
 
 import math
@@ -92,8 +92,7 @@ def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
 
 
 def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
-    """Write a png, pdf or svg with the name of this program in its metadata, and return its path; replaces such files
-    only."""
+    """Write a png, pdf or svg marked with the name of this program, and return the path; replaces only marked files."""
     with files.replaced(path, files.is_marked) as file:
         figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
     return path
@@ -107,19 +106,19 @@ def plain(text: str, most: int = 1000) -> str:
 
 
 def colors(count: int) -> list[str]:
-    """Return different colours of lines: a sequence if there are more lines than colours for colour-blind readers."""
+    """Return `count` different colours of lines: a sequence if the colours for colour-blind readers are too few."""
     if count <= len(COLORS):
         return list(COLORS[:count])
     return sequence(count)
 
 
 def sequence(count: int) -> list[str]:
-    """Return colours from dark to light for quantities in an order."""
+    """Return `count` colours from dark to light, for quantities in an order."""
     return [to_hex(colormaps[SEQUENCE](share)) for share in np.linspace(0.0, LIGHTEST, count)]
 
 
 def mix(color: str, white: float) -> str:
-    """Return a colour mixed with a share of white."""
+    """Return a colour mixed with white; `white` is its share."""
     red, green, blue = (part + white * (1.0 - part) for part in to_rgb(color))
     return to_hex((red, green, blue))
 
@@ -130,8 +129,8 @@ def line(number: int, count: int = 0) -> dict[str, Any]:
 
 
 def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw] = ()) -> Figure:
-    """Draw groups of panels below each other in even rows, then `maps`, all of one size; legends are those of
-    `place_legends` for each group."""
+    """Draw groups of panels below each other in even rows, then `maps`, all of one size, with legends by
+    `place_legends`."""
     most = COLUMNS[sum(map(len, (*groups, maps))) > MANY_PANELS]
     width = WIDTH * most / COLUMNS[0]
     parts = [[(row, 1, len(row)) for row in _split_rows(group, most)] for group in groups if group]
@@ -153,10 +152,9 @@ def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw]
 
 
 def set_height(figure: Figure, height: float) -> None:
-    """Set the height [inch] of a figure, and lay it out for good: Matplotlib would draw it once more to save it.
+    """Set the height [inch] of a figure, and fix its layout: Matplotlib would otherwise draw it once more to save it.
 
-    At a new height a single layout keeps margins that labels needed at the height before, and the lowest leave the
-    page.
+    A single layout at a new height would keep the margins of the old height, so that the lowest labels leave the page.
     """
     layouts = 1 if height == figure.get_figheight() else 2
     figure.set_figheight(height)
@@ -192,8 +190,8 @@ def _draw_row(place: SubFigure, panels: Sequence[Draw], rows: int, columns: int)
 def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
     """Add the legends of panels in rows, and return the height that each row needs for them [inch].
 
-    Entries of several panels stand once, below the last row. Other entries stand in their panel, or below it if there
-    are many.
+    Entries that several panels share are placed once, below the last row. Other entries are placed in their panel, or
+    below it if there are many.
     """
     entries = {axes: _find_entries(axes) for row in rows for axes in row}
     counts = Counter((name, _find_look(handle)) for own in entries.values() for name, handle in own.items())
@@ -249,7 +247,7 @@ def _add_below(owner: Axes | Figure | SubFigure, entries: dict[str, Artist], wid
 
 
 def panels_per_row(axes: Axes) -> int:
-    """Return the number of panels in the row of a panel."""
+    """Return the number of panels in the row to which a panel belongs."""
     place = axes.get_subplotspec()
     return place.get_gridspec().ncols if place else 1
 
@@ -283,8 +281,8 @@ def _written(value: float) -> str:
 
 
 def label_map(axes: Axes, size: tuple[float, float]) -> float:
-    """Set the labels and the aspect of a map of a `size` [m], and return its height over that of its panel; the short
-    side of a long map is stretched, and its label says so."""
+    """Set the labels and the aspect of a map of a `size` [m], and return the ratio of its height to the panel's height.
+    The short side of a long map is stretched, and its label says so."""
     ratio = size[0] / size[1]
     stretched = "y" * bool(ratio > LONGEST) + "x" * bool(ratio < 1.0 / TALLEST)
     axes.set_aspect("auto" if stretched else "equal")
@@ -294,7 +292,7 @@ def label_map(axes: Axes, size: tuple[float, float]) -> float:
 
 
 def thin_log_ticks(axis: Axis) -> bool:
-    """Set few ticks of a logarithmic axis; return True if it has few decades, else ticks are at powers of ten."""
+    """Set few ticks on a logarithmic axis; return True if the axis has few decades, else ticks are at powers of ten."""
     low, high = axis.get_view_interval()
     few = bool(high < 10.0**FEW_DECADES * low)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))

@@ -31,8 +31,8 @@ ROUNDING = 1e-20  # rounding: smallest drawn power over the largest
 
 @dataclass(frozen=True)
 class Sketch:
-    """Heights [m] of shape (ny, nx) on a box of `size` [m], with their statistics; `measured` is the spectrum of the
-    original map, if any."""
+    """Data of a surface's picture: heights [m] of shape (ny, nx) on a box of `size` [m], and their statistics;
+    `measured` is the spectrum of the original map, if any."""
 
     heights: Array
     size: tuple[float, float]
@@ -41,13 +41,13 @@ class Sketch:
 
 
 def draw_surface(sketch: Sketch, path: Path) -> None:
-    """Write the picture, a png, pdf or svg; raises OSError."""
+    """Write the picture of a surface, a png, pdf or svg; raises OSError."""
     with style.drawing():
         style.save_figure(picture("", [list(panels_of(sketch).values())]), path, path.suffix[1:])
 
 
 def panels_of(sketch: Sketch) -> dict[str, Panel]:
-    """Return the panels of a rigid surface by what they show."""
+    """Return the panels of a rigid surface by names of their contents."""
     return {
         "map of the heights": _map(sketch),
         "distribution of the heights": _distribution(sketch),
@@ -117,8 +117,8 @@ NOT_SELF_AFFINE = "no self-affine range was found"
 def describe_surface(
     job: Job, heights: Array, remarks: list[str], shortest: float | None, picture: Path
 ) -> Iterator[str]:
-    """Draw the picture and yield sentences on the heights [m], shape (ny, nx); root only. `shortest` [m] is the
-    shortest wave of a measured surface, else None. Raises InputError and RunError."""
+    """Draw the picture of a surface and yield sentences on its heights [m], shape (ny, nx); root only. `shortest` [m]
+    is the shortest wave of a measured surface, else None. Raises InputError and RunError."""
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
     found, part, measured = surface_statistics.surface_statistics(heights, job.grid.size), job.surface[0], None

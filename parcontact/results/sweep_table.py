@@ -1,6 +1,7 @@
 """Tables of a sweep: sweep.csv with a row per case, sweep_curves.csv with a row per point of friction curves.
 
-sweep_mean.csv and sweep_curves_mean.csv have means over seeds."""
+sweep_mean.csv and sweep_curves_mean.csv contain means over seeds.
+"""
 
 import fcntl
 import math
@@ -57,7 +58,7 @@ def _asks_for(case: Case, section: str) -> bool:
 
 
 def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
-    """Yield for each column of errors the largest error of each finished case, by its number."""
+    """Yield, for each column of errors, the largest error of each finished case by the number of the case."""
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     for name in slide.ERRORS:
         found: dict[int, float] = {}
@@ -68,7 +69,7 @@ def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
 
 
 def fail(case: Case, reason: str) -> None:
-    """Store the reason for the failure of a case in its directory, or remove it if `reason` is ''; root only."""
+    """Store the reason why a case failed in its directory, or remove it if `reason` is ''; root only."""
     path = case.job.output.directory / FAILURE
     with suppress(OSError):
         if reason:

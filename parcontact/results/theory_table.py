@@ -33,7 +33,8 @@ OF_WAVES = {"continuum": "the spectrum of the surface", "lattice": "the waves of
 
 
 class TheorySettings(NamedTuple):
-    """The factor that corrects friction in partial contact, and the kind of waves: continuum or lattice."""
+    """Settings of a prediction: factor that corrects friction in partial contact, and kind of waves, continuum or
+    lattice."""
 
     gamma: float
     waves: str
@@ -51,17 +52,18 @@ def write_settings(directory: Path, settings: TheorySettings) -> None:
 
 
 def is_our_settings(path: Path) -> bool:
-    """Return True if this program wrote a file of settings; raises OSError."""
+    """Return True if a file of settings was written by this program; raises OSError."""
     return path.read_bytes().startswith(HEAD.encode())
 
 
 def is_own_table(path: Path) -> bool:
-    """Return True if a table has settings in its directory, and is therefore one of theory; raises OSError."""
+    """Return True if a table has settings in its directory, and is therefore a table of theory; raises OSError."""
     return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
 
 
 def read_settings(directory: Path) -> TheorySettings | None:
-    """Return the settings of the table in a directory, None if there are none; raises InputError for a damaged file."""
+    """Return the settings of the theory table in a directory, None without any; raises InputError for a damaged
+    file."""
     path = directory / FILE
     try:
         text = path.read_bytes()
@@ -78,7 +80,7 @@ def read_settings(directory: Path) -> TheorySettings | None:
 
 
 def shared(directories: Iterable[Path]) -> TheorySettings | None:
-    """Return the settings that the tables in these directories have in common, if any. Raises as `read`."""
+    """Return the settings that the theory tables in these directories share, or None. Raises as `read_settings`."""
     found = {read_settings(directory) for directory in directories if (directory / TABLE).is_file()}
     return found.pop() if len(found) == 1 else None
 
@@ -97,7 +99,8 @@ RUN = "measures.csv"
 
 
 class ComparedResult(NamedTuple):
-    """A result [-] of the theory, the result of the run (None without a run), and its error (NaN if unknown)."""
+    """A result [-] of the theory, the run's result (None without a run), and the error of the run's result (NaN if
+    unknown)."""
 
     name: str
     theory: float
@@ -109,8 +112,8 @@ def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) 
     """Return results of theory.csv and of measures.csv in a directory, none without theory.csv. `cell` is the spacing
     of the grid along x [m].
 
-    Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), for the run the corrected
-    area; without a slide the contact area of the last instant. Raises InputError for damaged tables.
+    Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), with the corrected area
+    for the run; without a slide, the contact area of the last instant. Raises InputError for damaged tables.
     """
     predicted, found = (_results(directory / name, history, cell) for name in (TABLE, RUN))
     nothing = None, math.nan

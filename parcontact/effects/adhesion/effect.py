@@ -160,8 +160,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the range of attraction [m] that `auto` means on the mesh of the job, by its key; empty if it is
-        given."""
+        """Return the range [m] that `auto` means on the mesh of the job, by its key; empty if a range is given."""
         reach = chosen_range(job)
         return {} if reach is None else {"adhesion.range": reach}
 

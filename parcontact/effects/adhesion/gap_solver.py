@@ -174,8 +174,8 @@ class GapSolver:
         tolerance: float,
         operators: GapOperators | None = None,
     ) -> GapSolution:
-        """Solve from the map `gap`, which is overwritten by the solution; collective. `operators` replace the operators
-        of the solver."""
+        """Solve from the map `gap`, which is overwritten by the solution; collective. `operators` replace the
+        solver's."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, no_descent, jumped = (math.inf, 0), 0.0, 0, False, False

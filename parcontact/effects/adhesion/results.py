@@ -151,8 +151,8 @@ def headline(run: Results) -> Iterator[str]:
 
 
 def swept(run: Results) -> Iterator[tuple[str, float]]:
-    """Yield names and values of the last pull-off of a sweep's case: force and error [N], approach [m]; nothing if the
-    contact holds."""
+    """Yield names and values of a case's last pull-off: force and error [N], approach [m]; none if the contact
+    holds."""
     if run.job is None or run.job.section("adhesion") is None:
         return
     if lost := [each for each in find(run.table, bool(run.detached)) if each.lost]:

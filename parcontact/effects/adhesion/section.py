@@ -45,8 +45,7 @@ class Adhesion(Part):
 
 
 def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
-    """Return the law of a section, None without one; the range `auto` is the smallest that the cells of the grid
-    resolve."""
+    """Return the law of a section, None without one; a range `auto` is the smallest that the cells resolve."""
     if section is None:
         return None
     reach = section.range

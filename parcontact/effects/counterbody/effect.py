@@ -1,5 +1,4 @@
-"""A counterbody that deforms: the pair of both bodies replaces the material of a job, and steps are made as without
-it."""
+"""A counterbody that deforms: the pair of both bodies replaces the material of a job; steps are the usual ones."""
 
 from __future__ import annotations
 
@@ -90,7 +89,7 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def changed_material(job: Any) -> Any:
-        """Return the pair of both bodies, which replaces the material of a job; in a steady state the counterbody has
+        """Return the pair of both bodies, which replaces the material; in a steady state the counterbody has
         relaxed."""
         relaxed = _has_relaxed(job)
         if isinstance(job.material, Pair) or (relaxed and job.counterbody.fitted.long_modulus == 0.0):  # refused

@@ -44,8 +44,8 @@ SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits 
 
 
 def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
-    """Return wavenumbers m [1/m] along the depth for bands between two wavenumbers [1/m], and their weights in `2/pi
-    int ... dm`."""
+    """Return wavenumbers m [1/m] along the depth for bands between two wavenumbers [1/m], and weights in the
+    integral."""
     ends = np.log(LOWEST * low), np.log(HIGHEST * high)
     m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
     step = float(np.log(m[1] / m[0]))
@@ -61,8 +61,7 @@ def uniform(body: Conductor, m: Array, time: float) -> Array:
 
 @dataclass(frozen=True)
 class Warming:
-    """The factors of S_j(m) for each wave of a band's half spectrum, shape (m, waves), times the number of equal
-    waves."""
+    """The factors of S_j(m) for each wave of a band's half spectrum, shape (m, waves), with their multiplicity."""
 
     symbols: Array
 
@@ -189,8 +188,8 @@ class HeatOfBands:
             raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
 
     def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the bands have the rises that their heat causes. There is no heat until everything else has
-        settled for cold rubber."""
+        """Return True if the bands have the rises that their heat causes. There is no heat until all else has settled
+        for cold rubber."""
         rubbed = road.rub(results) * road.speed
         self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises
         if math.isnan(self._cold):
@@ -201,8 +200,7 @@ class HeatOfBands:
         return bool(np.all(self._settled))
 
     def move(self, road: RoadSliding, results: Results) -> None:
-        """Set the temperature rises of the next round; raises RunError if they exceed the range of the material's
-        shift."""
+        """Set the temperature rises of the next round; raises RunError if they exceed the shift's range."""
         over, last, most = self._over, self._last, self._highest - road.own_temperature
         at_most = (self._rises == most) & (over > 0.0)
         if not np.all(self._settled) and np.all(self._settled | at_most):

@@ -155,8 +155,7 @@ def feeds_back(job: Any) -> bool:
 
 
 class ThermalColumns(Effect[ThermalMemory]):
-    """Columns of heat: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface
-    [K].
+    """Columns of heat: mean temperature rise of the contact, weighted by heat, and highest rise of the surface [K].
 
     At rest the weights of the last sliding are used.
     """
@@ -318,8 +317,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory that a checkpoint holds; collective. Missing waves, of shorter steps than before, start at
-        0."""
+        """Return the memory that a checkpoint holds; collective. Missing waves, of shorter steps, start at 0."""
         per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

@@ -231,8 +231,8 @@ class Heating:
 
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
-    """Return g of the time steps (1) for waves along the depth with these `rates`, averaged over the dissipating waves;
-    1 without depths."""
+    """Return g of the time steps (1) for waves with these `rates`, averaged over dissipating waves; 1 without
+    depths."""
     return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
@@ -293,8 +293,7 @@ class HeatMemory:
         rise of the surface [K] into `out`, and return the mean rise [K] where the body releases heat, weighted by this
         heat.
 
-        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` are factors that give both maps the
-        mean 1.
+        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` give both maps the mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)

@@ -118,7 +118,7 @@ class Feedback:
 
 
 class HeatLoop:
-    """Loop that finds the temperatures of steady states on one grid; with feedback all rubber has the flash
+    """Loop that finds the temperatures of steady states on one grid; with feedback all rubber is at the flash
     temperature."""
 
     def __init__(self, setup: Setup) -> None:

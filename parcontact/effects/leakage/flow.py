@@ -479,8 +479,8 @@ FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edi
 class PressureDrop:
     """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas.
 
-    If `total` is True, the fluid carries its part of the load, and loads are measured above the pressure `ambient` [Pa]
-    (default: `low`).
+    If `total` is True, the fluid carries its part of the load, and loads are measured above `ambient` [Pa] (default:
+    `low`).
     """
 
     fluid: Fluid
@@ -507,8 +507,7 @@ class PressureDrop:
         return (0.5 * (self.low + self.high), *ends)
 
     def local_loads(self, load: float) -> tuple[float, float]:
-        """Return the loads [Pa] that contact carries at the high and at the low side if the fluid carries its part of
-        `load`."""
+        """Return the loads [Pa] that contact carries at the high and at the low side if the fluid carries its part."""
         return load + self.outside - self.high, load + self.outside - self.low
 
     def conducting_gap(self, gap: NDArray[np.float64], pressure: float) -> NDArray[np.float64]:
@@ -527,8 +526,8 @@ class PressureDrop:
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
     def mass_flow(self, conductivity: float, length: float, width: float) -> float:
-        """Return the mass flow [kg/s] for a conductivity [m^3], a length along and a width across the flow [m]; NaN if
-        the density is unknown."""
+        """Return the mass flow [kg/s] for a conductivity [m^3] over a length and a width [m]; NaN for an unknown
+        density."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
 
@@ -541,8 +540,8 @@ class PressureDrop:
         return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
 
     def describe_inertia(self, axis: str, viscous: float, bound: float) -> str:
-        """Return a warning if the viscous flow of a gas [kg/s] along an axis is near or above the bound by inertia
-        [kg/s]; '' otherwise."""
+        """Return a warning if the viscous flow of a gas [kg/s] along an axis is near its bound by inertia [kg/s], or
+        ''."""
         if not viscous > INERTIA * bound:
             return ""
         both = 1.0 / (1.0 / viscous + 1.0 / bound)

@@ -65,8 +65,7 @@ class Filled:
 
 
 def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
-    """Return the share s in all cells of a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly)
-    [m]."""
+    """Return the share s in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
     cubes = gap.T**3
     mean = float(cubes.mean())
     resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)
@@ -163,7 +162,7 @@ def seal_flow(
     gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
 ) -> dict[str, float]:
     """Return the values of a seal's columns by name, and the bound of the mass flow by inertia [kg/s], for the gap [m]
-    after all rounds. `rounds` is None if the fluid has no pressure. A gap with less flow than the small leak is
+    after all rounds. `rounds` is None if the fluid has no pressure. A gap with a smaller flow than the leak is
     closed."""
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)

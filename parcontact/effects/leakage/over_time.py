@@ -261,8 +261,8 @@ class Gaps:
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> FloatMap:
-        """Return the map of the gap [m] of the undeformed surface that just touches; raises InputError if its heights
-        no longer exist."""
+        """Return the map of the gap [m] of the undeformed surface that just touches; raises InputError without its
+        heights."""
         job = reading.load(self.directory / RESOLVED)
         setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
@@ -323,8 +323,7 @@ class Gaps:
         return self._measured(index, "pressure")
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None, curves: Sequence[LoadCurve] = ()) -> LeakInstant:
-        """Return the row of leak.csv for an instant; `curves`, along x and y, are given if the fluid carries a part of
-        the load."""
+        """Return the row of leak.csv for an instant; `curves`, along x and y, are for a fluid that carries load."""
         found, row = solved.leak, {name: self._measured(index, name) for name in LeakInstant._fields[1:3]}
         totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
         along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))

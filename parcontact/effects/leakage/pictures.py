@@ -24,8 +24,7 @@ THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker":
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return True if a constriction [m] is open but too narrow for continuum flow; an array for several
-    constrictions."""
+    """Return True, or an array, where a constriction [m] is open but too narrow for continuum flow."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 
@@ -115,8 +114,7 @@ def draw_leakage(
     rows: Sequence[Any],
     over: str = "",
 ) -> Path:
-    """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants. Return the file's
-    path."""
+    """Draw the flow along x and y on the map of the gap at an instant, and K of all instants. Return the path."""
 
     circled = ", constriction circled" * any(flow.percolates for flow in flows)
     title = f"flow through the gap, {instant}\ncontact black{circled}"
@@ -127,8 +125,7 @@ def draw_leakage(
 
 
 def panel_of(rows: Sequence[Any], over: str) -> Panel:
-    """Return the panel of K against pressure or time, as `over` says (default: time if a pressure occurs more than
-    once).
+    """Return the panel of K against `over`, pressure or time (default: time if a pressure occurs more than once).
 
     Against pressure, only the last of consecutive instants at one pressure is drawn.
     """
@@ -168,8 +165,7 @@ def _place(cell: tuple[int, int], size: tuple[float, float], shape: tuple[int, .
 
 
 def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:
-    """Return the map of |g^3 grad p| in open cells, divided by its largest value, NaN elsewhere; in single
-    precision."""
+    """Return the map of |g^3 grad p| in open cells, divided by its maximum, NaN elsewhere; in single precision."""
     slopes = []
     for axis, length in ((0, size[1]), (1, size[0])):
         faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # no flow into walls

@@ -98,8 +98,8 @@ def _describe_leak(columns: Columns, row: int) -> str:
 
 
 def exported(run: Results) -> list[ExportedTable]:
-    """Return tables of the conductivities at each load for other programs; the last row counts if a load occurs twice.
-    Empty without leak.csv."""
+    """Return tables of the conductivities by load for other programs, the last row for equal loads; none without
+    leak.csv."""
     columns = run.read(TABLE)
     names = [name for name in EXPORTED if name in columns]
     loads = [float(f"{load:.9g}") for load in columns.get("pressure", ())]  # without rounding errors
@@ -129,8 +129,7 @@ def describe_leak_stop(run: Results) -> list[str]:
 
 
 def describe_axis(columns: Columns, axis: str) -> str:
-    """Return a text on how leakage along an axis changes from row to row, such as `stops between 1.05 and 1.10 MPa`; ''
-    if unknown."""
+    """Return how leakage along an axis changes, such as `stops between 1.05 and 1.10 MPa`; '' if unknown."""
     flows, pressures = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure"))
     pairs = enumerate(zip(flows, pressures, strict=False))
     known = [row for row, pair in pairs if not any(map(math.isnan, pair))]

@@ -20,8 +20,7 @@ from .steady import SHARE, Vector, depths_between, strains_of
 
 
 class StrainProbe:
-    """Measures the squares S(z) of the strain in the contacts of a band at all depths, and their weights in the band's
-    strain."""
+    """Measures the squares S(z) of the strain in a band's contacts at all depths, and their weights in its strain."""
 
     means: ClassVar[Means] = {"squares": by_power, "strain_weights": by_power}
 

@@ -1,5 +1,4 @@
-"""Panels of softening: strain by band, and factors of the moduli against strain, with the strains of a friction
-curve."""
+"""Panels of softening: strain by band, and factors of the moduli against strain, with strains of a curve."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -111,8 +111,7 @@ EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
 
 def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
-    """Return the factors in a file of a strain sweep, and a sentence on the strain at which they are 1; '' if the file
-    has factors.
+    """Return the factors in a file of a strain sweep, and a sentence on the strain at which they are 1, '' for factors.
 
     Moduli are divided by their values at the strain `reference` [-], by default in the first row. Raises InputError
     with the file and what was expected.

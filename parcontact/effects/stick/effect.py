@@ -246,8 +246,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return Sheared(measures, settled.force, settled.lost, slipping, error, share, time, mesh)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
-        """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN
-        without energies."""
+        """Return the two parts of friction, the share of the box that sticks, and the loss in slip [J], NaN without
+        energies."""
         return *memory.columns, math.nan if memory.energy is None else memory.lost
 
     def field(self, memory: StickMemory, name: str) -> Array:

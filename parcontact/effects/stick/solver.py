@@ -258,8 +258,7 @@ def change_since(bound, x, y, last_x, last_y, factor):
 
 @loop
 def slope_and_curvature(t, new_t, u, new_u, e):
-    """Return the sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the
-    slip `w = e - u`."""
+    """Return the sums of d w, d A d and |t w|, for the change d of the tractions, with the slip `w = e - u`."""
     slope, curvature, size = 0.0, 0.0, 0.0
     for j in range(t.shape[0]):
         row_slope, row_curvature, row_size = 0.0, 0.0, 0.0
@@ -284,8 +283,7 @@ Vector = tuple[float, float]
 
 
 def stacked(slab: Slab) -> Slab:
-    """Return the slab of maps with two components: each rank holds the rows of the first component, then those of the
-    second."""
+    """Return the slab of maps with two components: each rank holds rows of the first, then of the second component."""
     return Slab(slab.comm, slab.nx, 2 * slab.ny, slab.tally, lambda rank: _twice(slab.rows_of(rank)))
 
 
@@ -415,8 +413,7 @@ class Tractions:
 
 
 class TangentialSolver:
-    """Solver of tractions on one grid, with the `operator` of the body for stacked tractions and a `preconditioner` for
-    one component."""
+    """Solver of tractions on one grid: `operator` for stacked tractions, `preconditioner` for one component."""
 
     def __init__(self, slab: Slab, operator: ShearOperator, preconditioner: Operator, grids: Grids, limit: int) -> None:
         self.slab, self._limit = slab, limit
