@@ -24,7 +24,7 @@ import numpy as np
 from ..contact.constraint import InterfaceLaw
 from ..effects.relaxation import relaxation_of
 from ..errors import RunError
-from ..files.directory import MARCHES
+from ..files import outputs
 from ..files.recorder import StepRow
 from ..job import Job
 from ..march.point import Point
@@ -129,7 +129,7 @@ class RoadHistory(RoadSliding):
 
     def keep_in(self, directory: Path) -> None:
         """Store marches in a file of this directory until `forget` is called; raises RunError."""
-        self._cascade.store.keep_in(directory, self.job, MARCHES)
+        self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
         """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""

@@ -13,6 +13,7 @@ from ..columns import BANDS, choose_columns, names_of
 from ..doubts import Doubt
 from ..effects.relaxation import relaxation_of, temperature_of
 from ..errors import RunError, UnsolvedError
+from ..files import outputs
 from ..job import Job
 from ..job.listing import answers
 from ..march.budget import ErrorBudget, ErrorParts
@@ -32,7 +33,6 @@ LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band
 LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
-TABLE = "bands.csv"
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class RoadSliding:
         self.loops: list[BandLoop] = [loop for made in answers("bands", "loops") for loop in made(job, self.cut)]
         options = [option for asked in job.asked("curve_options") for option in asked(job)]
         self._columns = names_of(choose_columns(BANDS, when=options))
-        self.table = None if job.history else (TABLE, self._columns)  # of a history it has the history
+        self.table = None if job.history else (outputs.BANDS, self._columns)  # of a history it has the history
         self._cascade = Cascade(job, self.cut, slab)
         self.setup: Setup = replace(self._cascade.band(0, 0).setup, slab=slab)
         self.temperature, self._own_temperature = math.nan, temperature_of(job.material)

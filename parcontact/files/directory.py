@@ -18,38 +18,12 @@ from typing import Any
 from ..errors import InputError, InUseError
 from ..job.reading import CASES
 from ..parallel.slab import Slab
-from . import checkpoint, files, hdf5, tables
-from .tables import SCENE, VERBS, Claim
+from . import checkpoint, files, hdf5, outputs, tables
+from .tables import SCENE, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
-MARCHES = "checkpoint/marches.json"  # finished marches of bands
-RESULTS = {
-    "run": ("measures.csv", "fields.h5", "cycles.csv", "bands.csv", "fields.xdmf", "run.log", MARCHES),
-    "steady": (
-        "steady.csv",
-        "steady_waves.csv",
-        "bands.csv",
-        "steady.h5",
-        "steady_theory.csv",
-        "bands_theory.csv",
-        tables.FILE,
-        tables.LOG,
-    ),
-    "study": ("study.csv", "study.txt", "convergence.png"),
-}
-COPIES = {  # copies of the job: as given, and with every default
-    "run": ("job.yaml", "job.resolved.yaml"),
-    "steady": ("steady.job.yaml", "steady.resolved.yaml"),
-    "study": ("study.job.yaml", "study.resolved.yaml"),
-}
 LOCK = ".lock"
-PERMITTED = (
-    tables.NAME,
-    "theory.csv",
-    "theory.yaml",
-    "steady_theory.csv",
-    "bands_theory.csv",
-)  # may be there before the first run
+PERMITTED = (tables.NAME, *outputs.THEORY.written)  # may be there before the first run
 SHOWN_NAMES = 4  # tuning: most names of files in a message
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start from the beginning, or --out for another directory"
@@ -59,14 +33,14 @@ class Directory:
     """A directory of results. Only root accesses it; methods that are collective broadcast the result."""
 
     def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
-        self.path, self.slab, self.verb = path, slab, verb
+        self.path, self.slab, self.verb, self.outputs = path, slab, verb, outputs.BY_VERB[verb]
         self.claims: dict[str, Claim] = {}
         self._lock: int | None = None
         self._made: list[Path] = []
 
     @property
     def checkpoints(self) -> Path:
-        return self.path / "checkpoint"
+        return self.path / outputs.RUN.checkpoints
 
     @property
     def stop_file(self) -> Path:
@@ -109,13 +83,13 @@ class Directory:
             self._rename_foreign_files(job)
             self.claims = {**self.claims, self.verb: claim}
             tables.write_claims(self.path, self.claims)
-            if self.verb == "run":
+            if self.outputs.checkpoints:
                 self.checkpoints.mkdir(exist_ok=True)
-            copy, table = COPIES[self.verb]
+            copy, resolved_copy = self.outputs.copies
             if not _same(self.path / copy, job):
                 with files.replaced(self.path / copy) as new, job.open("rb") as given:
                     shutil.copyfileobj(given, new)
-            files.replace_file(self.path / table, resolved)
+            files.replace_file(self.path / resolved_copy, resolved)
 
         self._on_root(act)
 
@@ -123,7 +97,7 @@ class Directory:
         """Remove files of earlier runs of this verb; collective. Call it after `make`, which renames foreign files."""
 
         def act() -> None:
-            checkpoints = [path for _, path in self.saved()] if self.verb == "run" else []
+            checkpoints = (path for _, path in self.saved())
             for path in [*(self.path / name for name in self._names()), *self._unfinished(), *checkpoints]:
                 path.unlink(missing_ok=True)
 
@@ -155,23 +129,23 @@ class Directory:
                 tables.write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
-        """Return steps and paths of checkpoints, the newest first; root only."""
+        """Return steps and paths of the checkpoints of this verb, the newest first; root only."""
         found = [
             (int(match.group(1)), path)
-            for path in self.checkpoints.glob("step-*.h5")
+            for path in (self.checkpoints.glob("step-*.h5") if self.outputs.checkpoints else ())
             if (match := re.fullmatch(r"step-(\d+)\.h5", path.name))
         ]
         return sorted(found, reverse=True)
 
     def results(self) -> list[str]:
         """Return the names of this verb's existing results; root only."""
-        found = [name for name in RESULTS[self.verb][:2] if (self.path / name).exists()]
-        return [*found, *(path.name for _, path in self.saved() if self.verb == "run")]
+        found = [name for name in (self.outputs.table, self.outputs.maps) if name and (self.path / name).exists()]
+        return [*found, *(path.name for _, path in self.saved())]
 
     def _names(self) -> list[str]:
         """Return the names of this verb's results, without those that another verb has in the directory."""
-        others = {name for verb in self.claims if verb != self.verb for name in RESULTS[verb]}
-        return [name for name in RESULTS[self.verb] if name not in others]
+        others = {name for verb in self.claims if verb != self.verb for name in outputs.BY_VERB[verb].written}
+        return [name for name in self.outputs.written if name not in others]
 
     def _unfinished(self) -> list[Path]:
         """Return the unfinished files of a killed run."""
@@ -181,13 +155,13 @@ class Directory:
 
     def _has_checkpoints(self) -> bool:
         """Return True if the directory has sound checkpoints, as a copy without its marker has."""
-        return any(checkpoint.is_one(path) for _, path in self.saved())
+        return any(checkpoint.is_one(path) for path in self.checkpoints.glob("step-*.h5"))
 
     def _rename_foreign_files(self, job: Path) -> None:
         """Rename files with the names of this verb's results if neither the marker nor a checkpoint proves their
         origin."""
-        if self.claim is None and not (self.verb == "run" and self._has_checkpoints()):
-            for name in (*self._names(), *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
+        if self.claim is None and not (self.outputs.checkpoints and self._has_checkpoints()):
+            for name in filter(None, (*self._names(), *self.outputs.copies, self.outputs.checkpoints)):
                 if not _same(self.path / name, job):
                     files.put_aside(self.path / name)
 
@@ -269,7 +243,7 @@ def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mappin
     for verb, claim in claims.items():
         if found := tables.list_differences(tables.differences(claim.job, data, SCENE)):
             raise InputError(
-                f"the output directory {directory} has {VERBS[verb]} of another job: {found}; "
+                f"the output directory {directory} has {outputs.BY_VERB[verb].words} of another job: {found}; "
                 f"{tables.keep_mesh(claim.job, found)}give --out for another directory"
             )
 

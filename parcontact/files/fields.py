@@ -1,12 +1,5 @@
-"""Maps of runs and curves in files.
-
-fields.h5: saved maps; and fields.xdmf, by which ParaView reads them.
-
-The file is laid out for all instants before the first one is saved. Saving an instant writes its maps and then its
-time, so a killed run leaves a readable file. Instants that were not reached have the time NaN.
-
-steady.h5: maps of steady states, one per solved point of a friction curve.
-"""
+"""Growing files of maps: fields.h5 over time, with fields.xdmf by which ParaView reads it; steady.h5 over the points of
+a friction curve."""
 
 import time as clock
 from collections.abc import Mapping, Sequence
@@ -14,23 +7,164 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from ..columns import FIELDS
 from ..errors import InputError
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from . import files, hdf5
+from . import files, hdf5, tables
 from .provenance import Provenance
 
 COORDINATES = ("t", "y", "x", "step")
 UNITS = {column.name: column.unit for column in FIELDS if column.name not in COORDINATES}  # of maps
-KIND = "parcontact fields"
+KIND, KIND_OF_STEADY_MAPS = "parcontact fields", "parcontact steady maps"
+AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # coordinates of points; load: mean pressure
+DATASETS = {name: f"{name}_map" if name in AXES else name for name in UNITS}  # data set of each map of points
 XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which grows with every instant [s]
 
 
-class FieldsFile:
-    """Saved maps of shape (t, y, x), with coordinates; all methods are collective.
+class SavedMaps:
+    """The maps in a file, and the coordinates `marks` of their places: instants of a run, which have `steps`, or points
+    of a curve. Raises ValueError if their numbers differ."""
+
+    def __init__(self, file: h5py.File) -> None:
+        over_time = "t" in file
+        axes = ["t"] if over_time else [name for name in AXES if name in file]
+        known = {name: name for name in UNITS} if over_time else DATASETS
+        self.datasets = {name: dataset for name, dataset in known.items() if dataset in file}
+        self.names = tuple(self.datasets)
+        self.steps: tuple[int, ...] = tuple(file["step"][...].tolist()) if over_time else ()
+        self.marks: dict[str, Array] = {name: file[name][...] for name in axes}
+        first, *_ = self.marks.values()
+        self.saved: list[int] = np.flatnonzero(~np.isnan(first)).tolist()
+        self.shape = (len(self.steps) if over_time else first.size, len(file["y"]), len(file["x"]))
+        wanted = dict.fromkeys(axes, self.shape[:1]) | dict.fromkeys(self.datasets.values(), self.shape)
+        for name, shape in wanted.items():
+            if file[name].shape != shape:
+                raise ValueError(f"{name} has shape {file[name].shape}")
+
+    @property
+    def times(self) -> Array:
+        """Times of the instants of a run [s], NaN if not saved."""
+        return self.marks["t"]
+
+    @property
+    def points(self) -> dict[int, tuple[float, ...]]:
+        """Saved points of a curve, by their indices."""
+        return {index: tuple(float(values[index]) for values in self.marks.values()) for index in self.saved}
+
+    def reached(self, step: int) -> list[int]:
+        """Return the steps up to a step that have saved maps."""
+        return [self.steps[index] for index in self.saved if self.steps[index] <= step]
+
+
+class GrowingMaps:
+    """A file of maps of shape (place, y, x), laid out for all places before the first one is saved; collective.
+
+    Saving a place writes its maps and then its coordinates `axes`, which are NaN before, so a killed run leaves a
+    readable file. Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; units of the coordinates and of
+    the maps by the names of their data sets.
+    """
+
+    def __init__(
+        self, path: Path, slab: Slab, size: tuple[float, float], axes: Mapping[str, str], units: Mapping[str, str]
+    ) -> None:
+        self.path, self.slab, self.size, self.axes, self.units = path, slab, size, axes, units
+        self.provenance = Provenance(())
+
+    def save_place(self, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
+        """Save maps by the names of their data sets, and then the coordinates of their place. Raises RunError."""
+        hdf5.save_maps(self.path, self.slab, index, maps, marks)
+
+    def replace_file(
+        self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: Sequence[int] = ()
+    ) -> None:
+        """Create a new file of a `kind` for `count` places, whose `steps` are data too.
+
+        Places of the present file `found` are copied: `kept` has their new and old indices. Maps that were not saved
+        are NaN.
+        """
+
+        def build(file: h5py.File) -> None:
+            file.attrs["kind"] = kind
+            self.provenance.write(file)
+            for name, unit in self.axes.items():
+                hdf5.add_coordinate(file, name, np.full(count, np.nan), unit)
+            if steps:
+                step = hdf5.fixed(file, "step", (count,), np.int64)
+                step[...] = steps
+                step.dims[0].attach_scale(file["t"])
+            hdf5.add_maps(file, self.slab, self.size, self.units, list(self.axes))
+
+        new = self.slab.agree(files.unused(self.path))
+        hdf5.lay_out(new, self.slab, build, count * len(self.units) * self.slab.nx * self.slab.ny * hdf5.DOUBLE)
+        if found:
+            self._copy(found, kept, new)
+        hdf5.write_on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+
+    def _copy(self, found: SavedMaps, kept: Mapping[int, int], new: Path) -> None:
+        rows, there = np.empty(self.slab.shape), found.datasets.values()
+        for index, old in kept.items():
+            for name in self.units:
+                rows.fill(np.nan)
+                if name in there:
+                    hdf5.read_rows(self.path, self.slab, [hdf5.Slice(name, (old,), rows)])
+                hdf5.write_rows(new, self.slab, [hdf5.Slice(name, (index,), rows)])
+        marks = {name: values[list(kept.values())] for name, values in found.marks.items()}
+        hdf5.set_marks(new, self.slab, list(kept), marks)
+        hdf5.sync(new, self.slab)
+
+
+class SteadyMaps(GrowingMaps):
+    """Maps of the points of a friction curve; collective.
+
+    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; (velocity [m/s], mean pressure
+    [Pa], optionally temperature [deg C]) of all points. Points saved by an earlier part of the curve are kept; a file
+    with other maps is renamed. `lacking` are the indices of points without maps.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        slab: Slab,
+        size: tuple[float, float],
+        names: Sequence[str],
+        points: Sequence[tuple[float, ...]],
+        provenance: Provenance,
+    ) -> None:
+        axes = dict(list(AXES.items())[: len(points[0])])
+        super().__init__(path, slab, size, axes, {DATASETS[name]: UNITS[name] for name in names})
+        self.names, self.points, self.provenance = tuple(names), points, provenance
+        found, _ = _found(path, slab)
+        wanted = {*names}, [*axes], (slab.ny, slab.nx)
+        if found and ({*found.names}, [*found.marks], found.shape[1:]) != wanted:
+            hdf5.write_on_root(slab, lambda: files.put_aside(path), f"cannot rename {path}")
+            found = None
+        saved = found.points if found else {}
+        others = [point for point in saved.values() if tables.lacking_points([point], points)]
+        there = [_row_of(point, saved) for point in (*points, *others)]
+        self.lacking = [index for index in range(len(points)) if there[index] is None]
+        if found is None or found.shape[0] != len(there):
+            kept = {index: row for index, row in enumerate(there) if row is not None}
+            self.replace_file(KIND_OF_STEADY_MAPS, len(there), found, kept)
+            self._rows = list(range(len(there)))
+        else:
+            free = iter([row for row in range(len(there)) if row not in saved])
+            self._rows = [next(free) if row is None else row for row in there]
+
+    def save(self, index: int, maps: Mapping[str, Array]) -> None:
+        """Save the maps of a point; raises RunError."""
+        marks = dict(zip(self.axes, self.points[index], strict=True))
+        self.save_place(self._rows[index], {DATASETS[name]: maps[name] for name in self.names}, marks)
+
+
+def _row_of(point: tuple[float, ...], saved: Mapping[int, tuple[float, ...]]) -> int | None:
+    """Return the index of a point among the `saved` ones."""
+    return next((row for row, other in saved.items() if tables.is_same(point, other)), None)
+
+
+class FieldsFile(GrowingMaps):
+    """Saved maps of a run over time; all methods are collective.
 
     Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; `steps` after which they are
     saved.
@@ -39,10 +173,10 @@ class FieldsFile:
     def __init__(
         self, path: Path, slab: Slab, size: tuple[float, float], names: Sequence[str], steps: Sequence[int]
     ) -> None:
-        self.path, self.slab, self.size, self.names = path, slab, size, tuple(names)
+        super().__init__(path, slab, size, {"t": "s"}, {name: UNITS[name] for name in names})
+        self.names = tuple(names)
         self.steps = {step: index for index, step in enumerate(steps)}
         self.trouble = ""  # failure to write fields.xdmf, which does not end a run; root only
-        self.provenance = Provenance(())
         self._drawn = 0.0
         self._kept: frozenset[int] = frozenset()
 
@@ -87,7 +221,7 @@ class FieldsFile:
         hdf5.change(self.path, self.slab, provenance.renew)
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
-        hdf5.save_maps(self.path, self.slab, self.steps[step], {name: maps[name] for name in self.names}, {"t": time})
+        self.save_place(self.steps[step], {name: maps[name] for name in self.names}, {"t": time})
         if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
             self._draw()
 
@@ -97,36 +231,11 @@ class FieldsFile:
         hdf5.sync(self.path, self.slab)
         self._draw()
 
-    def _build(self, file: h5py.File) -> None:
-        file.attrs["kind"] = KIND
-        self.provenance.write(file)
-        hdf5.add_coordinate(file, "t", np.full(len(self.steps), np.nan), "s")
-        step = hdf5.fixed(file, "step", (len(self.steps),), np.int64)
-        step[...] = list(self.steps)
-        step.dims[0].attach_scale(file["t"])
-        hdf5.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, "t")
-
-    def _replace(self, found: "SavedFields | None", kept: Sequence[int] = ()) -> None:
-        """Create a new file with copies of the maps of the steps `kept`; maps that were not saved are NaN."""
-        new = self.slab.agree(files.unused(self.path))
-        size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
-        hdf5.lay_out(new, self.slab, self._build, size)
-        if found:
-            self._copy(found, kept, new)
-        hdf5.write_on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+    def _replace(self, found: SavedMaps | None, kept: Sequence[int] = ()) -> None:
+        """Create a new file with copies of the maps of the steps `kept`."""
+        rows = {self.steps[step]: found.steps.index(step) for step in kept} if found else {}
+        self.replace_file(KIND, len(self.steps), found, rows, list(self.steps))
         self._draw()
-
-    def _copy(self, found: "SavedFields", kept: Sequence[int], new: Path) -> None:
-        rows = np.empty(self.slab.shape)
-        for step in kept:
-            for name in self.names:
-                rows.fill(np.nan)
-                if name in found.names:
-                    hdf5.read_rows(self.path, self.slab, [hdf5.Slice(name, (found.steps.index(step),), rows)])
-                hdf5.write_rows(new, self.slab, [hdf5.Slice(name, (self.steps[step],), rows)])
-        times = [found.times[found.steps.index(step)] for step in kept]
-        hdf5.set_marks(new, self.slab, [self.steps[step] for step in kept], {"t": times})
-        hdf5.sync(new, self.slab)
 
     def _draw(self) -> None:
         target = self.path.with_suffix(".xdmf")
@@ -155,36 +264,18 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
     return problem
 
 
-class SavedFields:
-    """The maps and instants in a field file; raises ValueError if their numbers differ."""
-
-    def __init__(self, file: h5py.File) -> None:
-        self.names = tuple(name for name in UNITS if name in file)
-        self.steps: tuple[int, ...] = tuple(file["step"][...].tolist())
-        self.times: NDArray[np.float64] = file["t"][...]
-        self.saved: list[int] = np.flatnonzero(~np.isnan(self.times)).tolist()
-        instants, places = (len(self.steps),), (len(file["y"]), len(file["x"]))
-        for name, shape in {"t": instants, **dict.fromkeys(self.names, instants + places)}.items():
-            if file[name].shape != shape:
-                raise ValueError(f"{name} has shape {file[name].shape}")
-
-    def reached(self, step: int) -> list[int]:
-        """Return the steps up to a step that have saved maps."""
-        return [self.steps[index] for index in self.saved if self.steps[index] <= step]
-
-
-def _found(path: Path, slab: Slab) -> tuple[SavedFields | None, str]:
+def _found(path: Path, slab: Slab) -> tuple[SavedMaps | None, str]:
     """Return the contents of a field file, and a message about lost maps; collective.
 
     An unreadable file is renamed. Raises InputError for a locked file.
     """
 
-    def look() -> tuple[SavedFields | None, str]:
+    def look() -> tuple[SavedMaps | None, str]:
         if not path.exists():
             return None, f"{path} is missing: the fields saved so far are lost"
         try:
             with h5py.File(path, "r") as file:
-                return SavedFields(file), ""
+                return SavedMaps(file), ""
         except BlockingIOError:
             raise InputError(f"{path} is locked by another program; let it close the file, and run again") from None
         except hdf5.FAILURES as error:
@@ -228,68 +319,3 @@ def xdmf(
         + "\n".join(grids)
         + "</Grid></Domain></Xdmf>\n"
     )
-
-
-KIND_OF_STEADY_MAPS = "parcontact steady maps"
-AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # coordinates of points; load: mean pressure
-DATASETS = {name: f"{name}_map" if name in AXES else name for name in UNITS}  # data set of each kind of map
-
-
-class SteadyMaps:
-    """Maps of shape (point, y, x), with velocity and load of each point, NaN until it is saved; collective.
-
-    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; (velocity [m/s], mean pressure
-    [Pa], optionally temperature [deg C]) of all points. Points saved by an earlier part of the curve are kept.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        slab: Slab,
-        size: tuple[float, float],
-        names: Sequence[str],
-        points: Sequence[tuple[float, ...]],
-        provenance: Provenance,
-    ) -> None:
-        self.path, self.slab, self.size, self.names, self.points = path, slab, size, tuple(names), list(points)
-        self.axes = dict(list(AXES.items())[: len(self.points[0])])
-        if not slab.agree(slab.root and self._fits()):
-            self._make(provenance)
-
-    def save(self, index: int, maps: Mapping[str, Array]) -> None:
-        """Save the maps of a point; raises RunError."""
-        marks = dict(zip(self.axes, self.points[index], strict=True))
-        hdf5.save_maps(self.path, self.slab, index, {DATASETS[name]: maps[name] for name in self.names}, marks)
-
-    def lacking(self) -> list[int]:
-        """Return the indices of points without maps; root only."""
-        with h5py.File(self.path, "r") as file:
-            return [number for number, speed in enumerate(file["velocity"][...]) if np.isnan(speed)]
-
-    def _fits(self) -> bool:
-        """Return True if the file has these points and maps; another file is renamed. Root only."""
-        shape = (len(self.points), self.slab.ny, self.slab.nx)
-        try:
-            with h5py.File(self.path, "r") as file:
-                wanted = {name for name, dataset in DATASETS.items() if dataset in file} == set(self.names)
-                if wanted and all(file[DATASETS[name]].shape == shape for name in self.names):
-                    saved = np.array([file[name][...] for name in self.axes]).T
-                    return bool(np.all(np.isnan(saved) | np.isclose(saved, self.points, rtol=1e-6)))
-        except hdf5.FAILURES:
-            pass
-        files.put_aside(self.path)
-        return False
-
-    def _make(self, provenance: Provenance) -> None:
-        new = self.slab.agree(files.unused(self.path))
-        size = len(self.points) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
-        hdf5.lay_out(new, self.slab, lambda file: self._build(file, provenance), size)
-        hdf5.write_on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
-
-    def _build(self, file: h5py.File, provenance: Provenance) -> None:
-        file.attrs["kind"] = KIND_OF_STEADY_MAPS
-        provenance.write(file)
-        for name, unit in self.axes.items():
-            hdf5.add_coordinate(file, name, np.full(len(self.points), np.nan), unit)
-        units = {DATASETS[name]: UNITS[name] for name in self.names}
-        hdf5.add_maps(file, self.slab, self.size, units, list(self.axes))

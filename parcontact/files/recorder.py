@@ -28,7 +28,7 @@ from ..march.budget import ErrorBudget
 from ..parallel.slab import Array
 from ..physics.measures import Certificate, Measures
 from ..streams import printable
-from . import fields, files, hdf5
+from . import fields, files, hdf5, outputs
 from .checkpoint import Contents, TableMark
 from .directory import Directory
 from .fields import FieldsFile
@@ -298,7 +298,7 @@ class Recorder:
         self._recording = recording
         self.console = Console(speaks=False)
         self._measures: MeasuresFile | None = None
-        table, log = self.path / "measures.csv", self.path / "run.log"
+        table, log = self.path / outputs.RUN.table, self.path / outputs.RUN.log
         columns = recording.branches, recording.added
 
         def cut_back() -> tuple[TableMark, list[str]]:
@@ -316,7 +316,7 @@ class Recorder:
         hdf5.write_on_root(self.slab, begin_table, f"cannot write {table}", InputError)
 
     def _begin_fields(self, provenance: Provenance, saved: Contents | None) -> FieldsFile | None:
-        path, recording = self.path / "fields.h5", self._recording
+        path, recording = self.path / outputs.RUN.maps, self._recording
         if not recording.maps or not recording.total:
             if saved is not None:
                 self.warnings += filter(None, [fields.cut_back(path, self.slab, saved.step)])
@@ -356,7 +356,7 @@ class Recorder:
         try:
             yield
         except OSError as error:
-            self.problem = self.problem or f"cannot write {self.path / 'measures.csv'}: {hdf5.reason(error)}"
+            self.problem = self.problem or f"cannot write {self.path / outputs.RUN.table}: {hdf5.reason(error)}"
         except RunError as error:
             self.problem = self.problem or str(error)
 
@@ -393,7 +393,7 @@ class Recorder:
         """
         with self._noting_problems():
             sync = self._measures.sync if self._measures else lambda: None
-            hdf5.write_on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
+            hdf5.write_on_root(self.slab, sync, f"cannot write {self.path / outputs.RUN.table}")
             if self._fields:
                 self._fields.sync(provenance)
         if self._fields and self._fields.trouble:

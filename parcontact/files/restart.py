@@ -16,7 +16,7 @@ from ..job.history import ChosenSteps, Step, Timeline, reached
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.entries import part_of
-from . import checkpoint, tables
+from . import checkpoint, outputs, tables
 from .checkpoint import Contents
 from .directory import ADVICE, Directory
 from .tables import Claim
@@ -78,7 +78,7 @@ def finished_before(
         steps, at = claim.finished
         whole = reached(at, timeline.end) if timeline.chooses else steps == len(timeline)
         other = any(tables.differences(claim.job, plain, SAME))
-        if other or not whole or not (directory.path / "measures.csv").exists():
+        if other or not whole or not (directory.path / outputs.RUN.table).exists():
             return ""
         return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it again)"
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..bands.road_history import RoadHistory, RungTask
-from ..bands.road_sliding import TABLE
 from ..columns import BANDS_OVER_TIME, added_by, names_of, to_csv
 from ..errors import InputError
 from ..job import Job, listing
@@ -22,14 +21,13 @@ from ..march.budget import SHOWN
 from ..parallel.root import Signals, on_root
 from ..parallel.slab import Slab
 from ..streams import Bar
-from . import files, hdf5, provenance, recorder, run, tables
+from . import files, hdf5, outputs, provenance, recorder, run, tables
 from .directory import ADVICE, Directory
 from .recorder import HEAD, Console, StepRow, step_line
 from .restart import SAME
 from .run import DONE, STOPPED_EARLY, Options, Watch
 from .tables import Claim
 
-MEASURES = "measures.csv"
 RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
 
 
@@ -55,7 +53,7 @@ def run_history(job: Job, slab: Slab, options: Options) -> int:
         directory.make(job.path, job.resolved(), Claim({**tables.kept(plain), "history": plain.get("history")}))
         if not goes_on:
             directory.clear()
-        console = Console(directory.path / "run.log", options.quiet) if slab.root else Console(speaks=False)
+        console = Console(directory.path / outputs.RUN.log, options.quiet) if slab.root else Console(speaks=False)
         try:
             for text in provenance.lines(slab.comm) if slab.root else ():
                 console.log(text)
@@ -105,7 +103,7 @@ def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -
                 different = tables.list_differences(tables.differences(claim.job, plain, ["history"]))
                 raise InputError(f"{directory.path} has the results of another history: {different}; {ADVICE}")
             return True, ""
-        if not all((directory.path / name).exists() for name in (MEASURES, TABLE)):
+        if not all((directory.path / name).exists() for name in (outputs.RUN.table, outputs.BANDS)):
             return False, ""
         return True, f"finished before, at t = {claim.finished[1]:g} s (--restart never: run it again)"
 
@@ -153,7 +151,7 @@ class _Run:
             return STOPPED_EARLY
         finally:
             self._bar.close()
-        rows = hdf5.write_on_root(self.slab, self._write, f"cannot write {self.directory.path / MEASURES}")
+        rows = hdf5.write_on_root(self.slab, self._write, f"cannot write {self.directory.path / outputs.RUN.table}")
         self.road.forget()
         for text in sum_up_errors(rows):
             self._say(text)
@@ -190,8 +188,8 @@ class _Run:
         added = added_by("interface") if self.job.section("interface") is not None else ()
         of_rows = (recorder.row_numbers(row if added else replace(row, added=()), 0) for row in rows)
         path = self.directory.path
-        files.replace_file(path / TABLE, to_csv(names_of(BANDS_OVER_TIME), bands))
-        files.replace_file(path / MEASURES, to_csv(recorder.columns(0, added), of_rows))
+        files.replace_file(path / outputs.BANDS, to_csv(names_of(BANDS_OVER_TIME), bands))
+        files.replace_file(path / outputs.RUN.table, to_csv(recorder.columns(0, added), of_rows))
         self.directory.note(saved=True, finished=(rows[-1].step, rows[-1].time))
         return rows
 

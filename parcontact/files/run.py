@@ -37,7 +37,7 @@ from ..physics.entries import Saved, part_of
 from ..printed import quantity
 from ..results import cycles, slide
 from ..results.results import Results
-from . import checkpoint, hdf5, provenance, recorder, restart, tables, wisdom
+from . import checkpoint, hdf5, outputs, provenance, recorder, restart, tables, wisdom
 from .checkpoint import Contents, Facts
 from .directory import Directory
 from .provenance import Link, Provenance, cite_lines, extend_chain
@@ -371,7 +371,7 @@ class Run:
         if not self.slab.root or not any(stage.frequency for stage in self.job.history):
             return
         try:
-            rows = tables.read_columns(self.directory.path / "measures.csv")
+            rows = tables.read_columns(self.directory.path / outputs.RUN.table)
             for text in cycles.write_cycles(self.directory.path, self.job, rows):
                 self.console.say(text)
         except (OSError, InputError) as error:
@@ -485,7 +485,7 @@ def _refuse_damaged(directory: Path) -> None:
     if lost := tables.find_lost_rows(directory):
         raise InputError(lost)
     with suppress(FileNotFoundError):
-        hdf5.open_results(directory / "fields.h5").close()
+        hdf5.open_results(directory / outputs.RUN.maps).close()
 
 
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:

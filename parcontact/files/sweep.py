@@ -19,8 +19,8 @@ from ..parallel.slab import Slab
 from ..parallel.tally import Groups
 from ..printed import name_cases, per_cent
 from ..results import sweep_table
-from ..results.results import KINDS, Results
-from . import files, run, tables
+from ..results.results import Results
+from . import files, outputs, run, tables
 from .directory import refuse_files, refuse_other_jobs
 from .run import DONE, STOPPED_EARLY
 from .sweep_warnings import SweepWarnings
@@ -208,7 +208,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     for case in cases:
         there = case.job.output.directory
         refuse_other_jobs(there, tables.sound_claims(there), plain_job(case.job))
-    if not claims and not {CASES, KINDS["sweep"]} & set(entries):
+    if not claims and not {CASES, outputs.SWEEP.table} & set(entries):
         refuse_files(directory, entries)
 
 

@@ -32,7 +32,7 @@ from typing import Any, NamedTuple, NoReturn
 from ..capabilities import folders
 from ..errors import InputError
 from ..printed import quantity
-from . import files
+from . import files, outputs
 
 MEND = "correct the line, or move the file away to continue without its rows"
 
@@ -114,7 +114,6 @@ def read_columns(path: Path) -> Columns:
 
 MARKER = ".parcontact"
 FORMAT = 1
-VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
 # sections in which all jobs of a directory must agree
 _MATERIALS = [one.SECTION for one in folders() if hasattr(one, "MATERIAL")]
 SCENE = ("grid", "bands", "surface", "material", "body", *_MATERIALS)
@@ -223,10 +222,9 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-LOG = "steady.log"  # log of a friction curve, in the directory of its table
 CLOSE = 1e-6  # rounding: relative difference below which speeds and pressures are the same
 
-Place = tuple[float, float, float]  # speed [m/s], mean pressure [Pa], temperature [deg C]
+Place = tuple[float, ...]  # speed [m/s], mean pressure [Pa], and temperature [deg C]
 
 
 class Wanted(NamedTuple):
@@ -258,16 +256,16 @@ def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:
 
 def lacking_points(points: Sequence[Place], there: Sequence[Place]) -> list[int]:
     """Return the indices of `points` that are not in `there`."""
-    return [number for number, point in enumerate(points) if not any(_same(point, other) for other in there)]
+    return [number for number, point in enumerate(points) if not any(is_same(point, other) for other in there)]
 
 
-def _same(one: Place, other: Place) -> bool:
+def is_same(one: Place, other: Place) -> bool:
     """Return True if two points are the same; NaN temperatures are equal."""
     pairs = zip(one, other, strict=True)
     return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
 
 
-FILE = "steady.lost.json"
+(FILE,) = outputs.STEADY.others
 PLACE = ("velocity", "pressure", "temperature")
 
 
@@ -288,7 +286,7 @@ def read(directory: Path) -> list[LostPoint]:
             LostPoint(Wanted(one["velocity"], one["pressure"], one.get("temperature", math.nan)), str(one["why"]))
             for one in json.loads(path.read_text(encoding="utf-8"))
         ]
-        return without(found, of_table(read_columns(directory / "steady.csv")))
+        return without(found, of_table(read_columns(directory / outputs.STEADY.table)))
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{path} cannot be read ({error}); move it away") from None
 
@@ -313,7 +311,7 @@ def name_lost(directory: Path) -> str:
     if there is none. Raises InputError for a damaged file."""
     if not (lost := read(directory)):
         return ""
-    solved = len(read_columns(directory / "steady.csv")["velocity"])
+    solved = len(read_columns(directory / outputs.STEADY.table)["velocity"])
     reasons: dict[str, list[Wanted]] = {}
     for at, why in lost:
         reasons.setdefault(why.split("; ")[0].split(". ")[0], []).append(at)
@@ -388,9 +386,8 @@ def _touched(path: Path) -> int:
         return 0
 
 
-RUN, CURVE = "measures.csv", "steady.csv"
-GROWING = (RUN, CURVE, "bands.csv", "steady_waves.csv")
-THEORY_FILE, OF_THEORY = "theory.csv", ("time", "distance", "friction", "contact_area")
+GROWING = (outputs.RUN.table, outputs.STEADY.table, outputs.BANDS, outputs.WAVES)
+OF_THEORY = ("time", "distance", "friction", "contact_area")
 MEND_CUT = "correct it, or move it away"
 
 
@@ -400,18 +397,19 @@ def read_results(path: Path) -> Columns:
     columns = read_columns(path)
     if path.name not in GROWING:
         refuse_cut(path)
-    if path.name == THEORY_FILE and (without := [name for name in OF_THEORY if name not in columns]):
+    if path.name == outputs.THEORY.table and (without := [name for name in OF_THEORY if name not in columns]):
         raise InputError(
             f"{path} has no column {', '.join(without)}: it was not written by `parcontact theory`; move it away"
         )
     for end, what in lasts:
-        count = _last_step(columns) if path.name == RUN else len(columns["velocity"])
+        count = _last_step(columns) if path.name == outputs.RUN.table else len(columns["velocity"])
         if count < end:
             raise InputError(f"{path} is damaged: {what}, and the table lacks rows; {MEND_CUT}")
-    if path.name == "bands.csv" and "velocity" in columns and (curve := path.with_name(CURVE)).is_file():
+    curve = path.with_name(outputs.STEADY.table)
+    if path.name == outputs.BANDS and "velocity" in columns and curve.is_file():
         points = [of_table(one) for one in (read_columns(curve), columns)]
         if lacking := lacking_points(*points):
-            raise InputError(f"{path} is damaged: it lacks {points[0][lacking[0]]}, which {CURVE} has; {MEND_CUT}")
+            raise InputError(f"{path} is damaged: it lacks {points[0][lacking[0]]}, which {curve.name} has; {MEND_CUT}")
     return columns
 
 
@@ -427,11 +425,12 @@ def find_lost_rows(directory: Path) -> str:
     claim = claim_of_run(directory)
     if claim is None or claim.finished is None:
         return ""
+    path = directory / outputs.RUN.table
     with suppress(InputError, OSError):
-        read_results(directory / RUN)
+        read_results(path)
         return ""
     return (
-        f"{directory / RUN} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; "
+        f"{path} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; "
         f"correct it, or move {directory} away to run the job again"
     )
 
@@ -444,12 +443,11 @@ def _last_step(columns: Columns) -> float:
 def _find_ends(path: Path) -> Iterator[tuple[float, str]]:
     """Yield the last step, or the number of points, that a table must have, with the reason. Raises InputError for an
     unreadable marker."""
-    verb = {RUN: "run", CURVE: "steady"}.get(path.name, "")
-    claim = sound_claims(path.parent).get(verb) if verb else None
-    if claim is not None and claim.finished is not None:
-        number = claim.finished[0]
-        yield number, f"its run has finished with step {number}" if verb == "run" else f"its curve has {number} points"
-    if verb == "run":
+    for verb, each in outputs.BY_VERB.items():
+        claim = sound_claims(path.parent).get(verb) if each.complete and path.name == each.table else None
+        if claim is not None and claim.finished is not None:
+            yield claim.finished[0], each.complete.format(claim.finished[0])
+    if path.name == outputs.RUN.table:
         saved = [int(one.stem[5:]) for one in path.parent.glob("checkpoint/step-*.h5") if one.stem[5:].isdecimal()]
         if saved:
             yield max(saved), f"its run has a checkpoint after step {max(saved)}"

@@ -181,8 +181,6 @@ def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
             yield Mistake(found.key_place if fault.at_key else found.place, f"{name} {fault.predicate}")
 
 
-RESOLVED = "job.resolved.yaml"
-STEADY_RESOLVED = "steady.resolved.yaml"
 SHOWN = (
     "title",
     "grid",

@@ -16,12 +16,12 @@ from .. import streams
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..doubts import Doubt, Kind
 from ..errors import InputError, RunError, UnsolvedError
-from ..files import files, hdf5, tables, wisdom
+from ..files import files, hdf5, outputs, tables, wisdom
 from ..files.directory import ADVICE, Directory
 from ..files.fields import SteadyMaps
 from ..files.provenance import Link, Provenance, cite_lines
 from ..files.recorder import Console, always
-from ..files.tables import LOG, GrowingTable, LostPoint, StopFile, Wanted
+from ..files.tables import GrowingTable, LostPoint, StopFile, Wanted
 from ..job import Job, listing
 from ..job.advice import describe_sample, more_points
 from ..job.history import Timeline
@@ -36,7 +36,6 @@ from .point import Point
 from .scene import Setup
 from .steady import SteadySliding
 
-WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # corr.area: corrected area
 
 
@@ -56,8 +55,8 @@ class CurveTable:
     def __init__(
         self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
     ) -> None:
-        self._console, self._job = Console(directory / LOG, quiet, 0), setup.job
-        self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
+        self._console, self._job = Console(directory / outputs.STEADY.log, quiet, 0), setup.job
+        self.path, self.heated, self.quiet = directory / outputs.STEADY.table, heated, quiet
         branches = setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
         options = [option for asked in self._job.asked("curve_options") for option in asked(self._job)]
         there = [*options, *["temperatures"] * heated, *["shear"] * bool(setup.choices.shears)]
@@ -399,7 +398,7 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
 
 def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTable | None:
     """Start the tables, or continue them, on root; collective. Raises InputError if that fails."""
-    further, made = WAVES if wanted.waves else sliding.table, list[CurveTable]()
+    further, made = (outputs.WAVES, names_of(STEADY_WAVES)) if wanted.waves else sliding.table, list[CurveTable]()
     act = lambda: made.append(CurveTable(path, sliding.setup, further, bool(wanted.temperatures), quiet))  # noqa: E731
     hdf5.write_on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
     return made[0] if made else None
@@ -412,7 +411,7 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
     cited = cite_lines(listing.plain_data(job))
     provenance = Provenance((Link(job.resolved(), slab.comm.size),), references=cited)
     points = [point if wanted.temperatures else point[:2] for point in wanted.points]
-    return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)
+    return SteadyMaps(directory.path / outputs.STEADY.maps, slab, job.grid.size, job.output.fields, points, provenance)
 
 
 @dataclass
@@ -437,7 +436,7 @@ class _Curve:
 
     def go(self, draw: Draw | None) -> int:
         """Solve the missing points of the curve; collective. Return the exit code."""
-        bare = self.maps.lacking() if self.maps and self.slab.root else []
+        bare = self.maps.lacking if self.maps else []
         lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
         for count, index in enumerate(lacking):
             if self._stopped():
@@ -498,5 +497,5 @@ class _Curve:
                 table.write(point, rows)
                 table.warn(self.watch.check_point(point.measures, str(wanted)), self.shows)
 
-        hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
+        hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / outputs.STEADY.table}")
         self.sliding.forget()

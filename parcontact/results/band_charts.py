@@ -20,9 +20,9 @@ import numpy as np
 from .. import printed
 from ..columns import SWEEP, names_of
 from ..errors import InputError
+from ..files import outputs
 from ..job import Stage, load
 from ..job.listing import answers, unit_of_path
-from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
 from . import style
 from .panels import Axis, ColumnPanel, Line, Panel, offered
@@ -31,13 +31,11 @@ from .results import CURVES, PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
 from .sweep_table import SAMPLES
 
-BANDS, BANDS_THEORY = "bands.csv", "bands_theory.csv"
 NEEDED_OF_BANDS = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
 SHOWN = 4  # number of velocities that are drawn as lines
 THIN_LINE = 1.0  # tuning: width of the lines of the theory [points]
 AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN_LINE}
-OVER_TIME, STEADY = "theory.csv", "steady.csv"
 STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
 STEADY_ENTRY = Line("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
 SAME = 1e-9  # rounding: of distances
@@ -46,16 +44,16 @@ ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 def panels_of_bands(directory: Path) -> list[Panel]:
     """Return panels of a curve's table of bands, for its first pressure and temperature."""
-    curve = Results(directory, "curve")
-    if "velocity" not in curve.read(BANDS):
+    curve = Results(directory, "steady")
+    if "velocity" not in curve.read(outputs.BANDS):
         return []
-    whole = curve.read(BANDS).arrays((*NEEDED_OF_BANDS, "friction", "contact_area"))
+    whole = curve.read(outputs.BANDS).arrays((*NEEDED_OF_BANDS, "friction", "contact_area"))
     columns = _choose(whole)
     if not columns["velocity"].size:
         return []
     theory = None
-    if curve.has(BANDS_THEORY):
-        theory = _choose(curve.read(BANDS_THEORY).arrays(("velocity", "pressure", "temperature", "band")))
+    if curve.has(outputs.BANDS_THEORY):
+        theory = _choose(curve.read(outputs.BANDS_THEORY).arrays(("velocity", "pressure", "temperature", "band")))
     found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
     for one in offered("BAND_PANELS"):
         (name,) = one.columns.values()
@@ -73,7 +71,7 @@ def panels_of_slips(run: PlottedRun) -> list[Panel]:
     ways = np.array([stage.seconds * stage.speed for stage in stages])
     starts = np.cumsum(ways) - ways
     slides = [number for number, stage in enumerate(stages) if stage.slides and stage.seconds]
-    if not slides or "distance" not in run.read(BANDS):
+    if not slides or "distance" not in run.read(outputs.BANDS):
         return []
     x, friction, area = Axis("slip of the stage", "m"), list[Line](), list[Line]()
     for count, number in enumerate(slides):
@@ -85,9 +83,9 @@ def panels_of_slips(run: PlottedRun) -> list[Panel]:
         for label, look, (at, *values) in ((name, style.line(count), own), *others):
             friction.append(Line(label, at, values[0], look))
             area.append(Line(label, at, values[1], look))
-    there = ((OVER_TIME, ENTRY), (STEADY, STEADY_ENTRY))
+    there = ((outputs.THEORY.table, ENTRY), (outputs.STEADY.table, STEADY_ENTRY))
     entries = [entry for name, entry in there if run.has(name)]
-    bands = run.read(BANDS).arrays()
+    bands = run.read(outputs.BANDS).arrays()
     last = bands["distance"] - starts[slides[-1]]
     kept = (last > 0.0) & (last <= ways[slides[-1]] + SAME * bands["distance"])
     return [
@@ -102,8 +100,8 @@ Curve = tuple[str, dict[str, Any], tuple[Array, ...]]  # name, look, and slip, f
 
 def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[Curve]:
     """Yield friction and area of the theory over the slip of a stage."""
-    if run.has(OVER_TIME):
-        theory = run.read(OVER_TIME).arrays(("distance", "friction", "contact_area"))
+    if run.has(outputs.THEORY.table):
+        theory = run.read(outputs.THEORY.table).arrays(("distance", "friction", "contact_area"))
         there = theory["distance"] - start
         rows = (there >= slip[0]) & (there <= slip[-1])
         yield "", THEORY_LOOK, (there[rows], theory["friction"][rows], theory["contact_area"][rows])
@@ -111,8 +109,8 @@ def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[Curve]:
 
 def _steady_of(run: PlottedRun, stage: Stage, slip: Array) -> Iterator[Curve]:
     """Yield friction and area of steady sliding at the velocity of a stage, over the last decade."""
-    if run.has(STEADY):
-        curve = run.read(STEADY).arrays(("velocity", "pressure", "friction", CORRECTED))
+    if run.has(outputs.STEADY.table):
+        curve = run.read(outputs.STEADY.table).arrays(("velocity", "pressure", "friction", CORRECTED))
         same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
         ends = np.array([max(slip[0], slip[-1] / 10.0), slip[-1]])
         for row in np.flatnonzero(same)[:1]:
@@ -179,7 +177,6 @@ def _some(speeds: Array) -> Sequence[float]:
     return [float(speed) for speed in speeds[places]]
 
 
-THEORY = "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
 COLD = "friction_cold"  # friction without feedback from heat
 EMPTY = np.zeros(0)
@@ -189,7 +186,7 @@ THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn 
 def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
     """Return panels of a table of steady states against the axis `over`; none without states, or for an impossible
     axis."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
     if over in ("time", "distance") or not columns["velocity"].size:
         return []
@@ -216,8 +213,8 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
             axes[name] = one.y
             panels.append((one.key, x, name))
     theory = {}
-    if x == "velocity" and COLD not in columns and curve.has(THEORY):  # the theory has no feedback
-        theory = curve.read(THEORY).arrays((*NEEDED, "shift_factor"))
+    if x == "velocity" and COLD not in columns and curve.has(outputs.STEADY_THEORY):  # the theory has no feedback
+        theory = curve.read(outputs.STEADY_THEORY).arrays((*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
     for key, along, name in panels:
@@ -229,14 +226,14 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
             series += _make_thin(theory, along, name, {} if alone else lines, "theory")
         found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
-        job = load(directory / STEADY_RESOLVED)
+        job = load(directory / outputs.STEADY.resolved)
         found += [panel for panels_of in answers("pictures", "curve_panels") for panel in panels_of(job, columns)]
     return found + (panels_of_bands(directory) if x == "velocity" else [])
 
 
 def steady_title(directory: Path) -> str:
     """Return the title of a curve's picture: the job's, with the pressure or force if all points have the same."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
     name = (curve.job.title if curve.job else "") or "steady sliding"
     return f"{name}: {printed.quantity(loads[0], axis.unit)}" if count_different(loads) == 1 else name

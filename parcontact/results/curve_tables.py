@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
-from ..files import tables
+from ..files import outputs, tables
 from ..job import Job, load
 from ..march.measured_range import excited_bands
 from ..physics.prony import complex_modulus
@@ -131,7 +131,7 @@ def friction_tables(curve: Results) -> list[ReportTable]:
 
 def compared_table(directories: Sequence[Path], names: Sequence[str]) -> list[ReportTable]:
     """Return a table with the friction of several curves at points that two or more have; an empty list without any."""
-    each = [_cells(Results(one, "curve")) if Results(one).has("steady.csv") else {} for one in directories]
+    each = [_cells(Results(one, "steady")) if Results(one).has(outputs.STEADY.table) else {} for one in directories]
     places = sorted({place for cells in each for place in cells}, key=_order)
     shared = [place for place in places if sum(place in cells for cells in each) > 1]
     warm = any(place[2] > -math.inf for place in shared)

@@ -28,7 +28,7 @@ import numpy as np
 
 from ..columns import CYCLES, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of
-from ..files import files
+from ..files import files, outputs
 from ..job import Job, Stage, Swing
 from ..march.constants import SOLVER_AREA
 from ..parallel.slab import Array
@@ -36,7 +36,6 @@ from ..physics.prony import complex_modulus, discrete_modulus
 from ..printed import per_cent, quantity, stated_error
 from .slide import SAME_INSTANT
 
-TABLE = "cycles.csv"
 LEAST_ROWS = 5  # rows of a cycle with an estimate of the error
 PAIRS = (
     2.0**3 - 1.0
@@ -157,7 +156,9 @@ def measure_last(job: Job, columns: Columns) -> dict[str, float]:
 def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
-    files.replace_file(directory / TABLE, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found)))
+    files.replace_file(
+        directory / outputs.RUN.tables[0], to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found))
+    )
     yield from _describe_stages(job, found)
 
 

@@ -36,7 +36,7 @@ def export_results(directory: Path, form: str, out: Path | None = None) -> Itera
     if not directory.is_dir():
         raise InputError(f"{directory} is not a directory")
     results = Results(directory)
-    found = [_friction(directory)] if "curve" in results.kinds else []
+    found = [_friction(directory)] if "steady" in results.kinds else []
     for offered in answers("results", "exported"):
         found += offered(results) if form == "csv" and "run" in results.kinds else ()
     if not found:
@@ -64,7 +64,7 @@ def _begins_with(first: bytes, path: Path) -> bool:
 
 def _friction(directory: Path) -> ExportedTable:
     """Return the friction of a curve by temperature, pressure and slip rate, which varies fastest."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     columns, given = curve.table, curve.temperature
     points = tables.of_table(columns)
     outside = _outside(curve.path, points)
@@ -84,7 +84,7 @@ def _friction(directory: Path) -> ExportedTable:
 
 def _outside(directory: Path, points: Sequence[Wanted]) -> dict[Wanted, str]:
     """Return the points at which the rubber is excited outside of its measured range, with the reason."""
-    path = Results(directory, "curve").job_file
+    path = Results(directory, "steady").job_file
     try:
         job = load(path) if path else None
         job = on_one_grid_of_all(job, cut_bands(job)) if job and job.bands is not None else job

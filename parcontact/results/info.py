@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from .. import capabilities
 from ..errors import InputError
-from ..files import checkpoint, fields, hdf5, tables
-from ..files.directory import MARCHES
+from ..files import checkpoint, fields, hdf5, outputs, tables
 from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
 from ..job import Job
@@ -29,7 +28,7 @@ from ..job.reading import CASES
 from ..parallel.slab import Slab
 from ..printed import quantity, with_error
 from . import cycles, slide, theory_table
-from .results import KINDS, PLACES, Results, describe_end, read_cases, swept_keys
+from .results import PLACES, Results, describe_end, read_cases, swept_keys
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown
@@ -85,7 +84,7 @@ def _checkpoint(path: Path) -> tuple[str, bool]:
 
 
 def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
-    layout = fields.SavedFields(file)
+    layout = fields.SavedMaps(file)
     saved = layout.saved
     lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
     lines += [*_runs(read_chain(file)), *_budget(read_budget(file))]
@@ -130,15 +129,14 @@ def describe_files(directory: Path) -> tuple[str, bool]:
         claims = tables.read_claims(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
-    if not claims and not any((directory / name).exists() for name in ("measures.csv", KINDS["sweep"])):
+    if not claims and not any((directory / name).exists() for name in (outputs.RUN.table, outputs.SWEEP.table)):
         raise InputError(
-            f"{directory} has no results yet: neither a file .parcontact, nor measures.csv or {KINDS['sweep']}; a run "
+            f"{directory} has no results yet: neither a file .parcontact, nor measures.csv or sweep.csv; a run "
             "writes them when it begins"
         )
     results = Results(directory)
     lines, problems = [f"{directory}: {results.title}"], list[str]()
-    logs = ("run.log", tables.LOG)
-    lines += dict.fromkeys(f"  {text}" for log in logs for text in meshes_of(directory / log))
+    lines += dict.fromkeys(f"  {text}" for log in outputs.LOGS for text in meshes_of(directory / log))
     for name, part in PARTS.items():
         try:
             lines += part(results) if (directory / name).exists() else ()
@@ -185,7 +183,7 @@ def _slides(job: Job | None) -> bool:
 
 def _theory(found: Results) -> Iterator[str]:
     run = Results(found.path, "run")
-    count = f"  Persson's theory: {len(run.read(theory_table.TABLE)['time'])} rows, "
+    count = f"  Persson's theory: {len(run.read(outputs.THEORY.table)['time'])} rows, "
     try:
         settings = theory_table.read_settings(run.path)
     except InputError:
@@ -197,7 +195,7 @@ def _theory(found: Results) -> Iterator[str]:
 
 
 def _curve(found: Results) -> Iterator[str]:
-    curve = Results(found.path, "curve")
+    curve = Results(found.path, "steady")
     columns, claims = curve.table, curve.claims
     if speeds := columns["velocity"]:
         best = curve.highest()
@@ -209,7 +207,7 @@ def _curve(found: Results) -> Iterator[str]:
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
             asked = f"; requested: {_accuracy_text(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
-        yield from (f"  warning: {text}" for text in warnings_of(curve.path / tables.LOG))
+        yield from (f"  warning: {text}" for text in warnings_of(curve.path / outputs.STEADY.log))
     if curve.lost:
         yield f"  the curve has {curve.lost}"
     yield from (f"  {text}" for text in curve.unfinished if text != curve.lost)
@@ -228,14 +226,14 @@ def _saved_states(found: Results) -> Iterator[str]:
 
 
 def _marches(found: Results) -> Iterator[str]:
-    with (found.path / MARCHES).open("rb") as file:
+    with (found.path / outputs.MARCHES).open("rb") as file:
         count = sum(1 for _ in file)
     yield f"  run in bands: not finished; finished marches: {count}"
 
 
 def _saved_maps(found: Results) -> Iterator[str]:
     with found.open_maps() as file:
-        layout = fields.SavedFields(file)
+        layout = fields.SavedMaps(file)
     yield f"  fields: {', '.join(layout.names)} at {len(layout.saved)} of {layout.times.size} instants"
 
 
@@ -267,14 +265,14 @@ def _study(found: Results) -> Iterator[str]:
 
 Describe = Callable[[Results], Iterator[str]]
 PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directory, by their file
-    "measures.csv": _run,
-    theory_table.TABLE: _theory,
-    "steady.csv": _curve,
-    "checkpoint": _saved_states,
-    MARCHES: _marches,
-    "fields.h5": _saved_maps,
+    outputs.RUN.table: _run,
+    outputs.THEORY.table: _theory,
+    outputs.STEADY.table: _curve,
+    outputs.RUN.checkpoints: _saved_states,
+    outputs.MARCHES: _marches,
+    outputs.RUN.maps: _saved_maps,
     **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
-    KINDS["sweep"]: _sweep,
+    outputs.SWEEP.table: _sweep,
     "study.txt": _study,
 }
 
@@ -292,13 +290,8 @@ Columns = Mapping[str, Sequence[float]]
 
 def find_headline(directory: Path) -> str:
     """Return the headline of an output directory: a sentence for each run, friction curve, sweep and study in it."""
-    parts = {
-        "measures.csv": _headline_of_run,
-        "steady.csv": _headline_of_curve,
-        "sweep.csv": _headline_of_sweep,
-        "study.txt": _headline_of_study,
-    }
-    return " ".join(filter(None, (part(directory) for name, part in parts.items() if (directory / name).is_file())))
+    kinds = Results(directory).kinds
+    return " ".join(filter(None, (sentence(directory) for kind, sentence in HEADLINES.items() if kind in kinds)))
 
 
 def _headline_of_run(directory: Path) -> str:
@@ -366,7 +359,7 @@ def _size(job: Job, share: float, error: float) -> str:
 
 def _headline_of_curve(directory: Path) -> str:
     """Return a sentence on the highest friction of a friction curve; '' without a point."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     if not curve.table["velocity"]:
         return ""
     best = curve.highest()
@@ -391,6 +384,14 @@ def _headline_of_sweep(directory: Path) -> str:
 def _headline_of_study(directory: Path) -> str:
     """Return the first sentence of a study, on its accuracy."""
     return next(iter(Results(directory, "study").sentences_of_study), "")
+
+
+HEADLINES: dict[str, Callable[[Path], str]] = {
+    "run": _headline_of_run,
+    "steady": _headline_of_curve,
+    "sweep": _headline_of_sweep,
+    "study": _headline_of_study,
+}
 
 
 def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:

@@ -22,7 +22,7 @@ from PIL import Image
 from .. import printed
 from ..effects.effect import touching_of
 from ..errors import InputError
-from ..files import files, hdf5
+from ..files import files, hdf5, outputs
 from ..job import Cylinder, Elastic, Job, Sphere
 from ..parallel.slab import Array
 from ..theory import hertz
@@ -380,7 +380,7 @@ def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Pat
     try:
         frames, rate = _draw(directory, name)
     except hdf5.FAILURES as error:
-        raise InputError(f"no movie from {directory / 'fields.h5'}: {hdf5.reason(error)}") from error
+        raise InputError(f"no movie from {directory / outputs.RUN.maps}: {hdf5.reason(error)}") from error
     for target in targets:
         _write_gif(target, frames, rate) if target.suffix == ".gif" else _write_mp4(target, frames, rate)
     return targets
@@ -392,7 +392,7 @@ def _find_ffmpeg() -> str | None:
 
 def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
     """Return the frames, and their rate [1/s]."""
-    path = directory / "fields.h5"
+    path = directory / outputs.RUN.maps
     run = PlottedRun(directory)
     with run.open_maps() as file:
         labels = label_frames(run, file)

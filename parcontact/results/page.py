@@ -20,21 +20,20 @@ from markupsafe import Markup, escape
 
 from .. import job as jobs
 from .. import streams
+from ..columns import TABLES
 from ..errors import InputError
-from ..files import files, hdf5, provenance
+from ..files import files, hdf5, outputs, provenance
 from ..files.provenance import PROGRAM
 from ..files.recorder import WARNING, log_lines
-from ..files.tables import LOG
 from ..job import Job, listing
 from ..job.listing import plain_data
-from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
+from ..job.reading import CASES, shown_job
 from ..printed import name_cases
 from . import info, plots, report_sections
 from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_panel, embed_file
-from .results import KINDS, Results, swept_keys
+from .results import Results, swept_keys
 from .slide import ERRORS
 
-LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 ESTIMATE = "estimated error of "
 MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # beginnings of lines about the machine
@@ -56,7 +55,7 @@ class Log:
 
 def read_logs(directory: Path) -> Log:
     """Return the contents of the logs of a directory; empty without a log."""
-    lines = [line for name in LOGS for line in log_lines(directory / name)]
+    lines = [line for name in outputs.LOGS for line in log_lines(directory / name)]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3
     counts: list[Sequence[str]] = [part.rsplit(" ", 1) for part in counted[-1].split(", ")] if counted else []
@@ -84,7 +83,7 @@ FRICTION = ERRORS[0]
 def costs(results: Results, found: Log, job: Job) -> Iterator[ReportSection]:
     """Yield the sections on the errors of a run or a curve, and on wall time, operator calls and counts."""
     columns = results.table
-    yield describe_errors(columns, found, job, results.kind == "curve")
+    yield describe_errors(columns, found, job, results.kind == "steady")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [
         ("steps or points", str(len(columns["seconds"]))),
@@ -114,7 +113,7 @@ def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job
 
 def origin_section(directory: Path, found: Log) -> ReportSection:
     """Return the section on provenance, from the newest file of a directory that states it."""
-    there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
+    there = [directory / name for name in outputs.MAPS if (directory / name).is_file()]
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     for path in there:
         try:
@@ -146,15 +145,11 @@ def list_citations(job: Job | None) -> ReportSection:
 
 SHOWN = {  # words and sections of the kinds of results
     "run": ("run", report_sections.describe_run),
-    "curve": ("friction curve", report_sections.describe_curve),
+    "steady": ("friction curve", report_sections.describe_curve),
     "sweep": ("sweep", report_sections.describe_sweep),
     "study": ("study", report_sections.describe_study),
 }
-ORIGINALS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
-MORE_TABLES = (
-    *("cycles.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
-    *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
-)
+ORIGINALS = {each.resolved: each.copies[0] for each in outputs.BY_VERB.values() if each.copies}
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that are shown in other sections
 
 
@@ -163,9 +158,11 @@ def describe_directory(directory: Path) -> Chapter:
     results = Results(directory)
     there = [kind for kind in results.kinds if kind in SHOWN]
     if not there:
-        raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS[kind] for kind in SHOWN)}")
+        raise InputError(
+            f"{directory} has no results: it has none of {', '.join(outputs.BY_VERB[kind].table for kind in SHOWN)}"
+        )
     sections = [SHOWN[kind][1](directory) for kind in there]
-    if "curve" in there:
+    if "steady" in there:
         sections.insert(0, report_sections.describe_friction(directory))
     found, title, cited, places = (read_logs(directory), "", list_citations(None), [f"{directory.absolute()}/"])
     if resolved := results.job_file:  # for a sweep, the job of its first case
@@ -178,11 +175,12 @@ def describe_directory(directory: Path) -> Chapter:
             of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
             warnings = warnings_of_cases(directory) or warnings
         sections += of_job
-        if there[0] in ("run", "curve"):
+        if there[0] in ("run", "steady"):
             sections += costs(results, found, job)
         cited = list_citations(job)
         sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
-    data = [embed_file(directory / name) for name in (*KINDS.values(), *MORE_TABLES) if results.has(name)]
+    tables = (*TABLES, *outputs.SWEEP.tables)
+    data = [embed_file(directory / name) for name in tables if name.endswith(".csv") and results.has(name)]
     text = "The tables, in SI units and with all digits, are stored in this file:"
     sections += [origin_section(directory, found), cited, ReportSection("Data", [text], downloads=data)]
     kinds = " and ".join(SHOWN[kind][0] for kind in there)

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 
 from .. import printed
 from ..errors import InputError
-from ..files import hdf5
+from ..files import hdf5, outputs
 from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
 from . import band_charts, histories, maps, style, theory_table
 from .panels import Axis, Line, Panel, offered, picture
 from .plotted_run import PlottedRun
-from .results import KINDS, Results, read_cases, swept_keys
+from .results import Results, read_cases, swept_keys
 
 PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
 MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
@@ -115,7 +115,7 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
 
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
-    has_run, has_curve, has_sweep = (kind in Results(directory).kinds for kind in ("run", "curve", "sweep"))
+    has_run, has_curve, has_sweep = (kind in Results(directory).kinds for kind in ("run", "steady", "sweep"))
     groups: list[Sequence[Panel]] = []
     titles, fields = list[str](), list[Panel]()
     if has_run:
@@ -139,7 +139,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
-        lacking = f"it has neither {KINDS['run']} nor {KINDS['curve']}{_suggest(directory)}"
+        lacking = f"it has neither {outputs.RUN.table} nor {outputs.STEADY.table}{_suggest(directory)}"
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
@@ -153,7 +153,7 @@ def _suggest(path: Path) -> str:
         return "; give the output directory of a run, such as out/job"
     found = [
         table.parent
-        for name in (KINDS["run"], KINDS["curve"], KINDS["sweep"])
+        for name in (outputs.RUN.table, outputs.STEADY.table, outputs.SWEEP.table)
         for table in sorted(path.glob(f"*/{name}"))
     ]
     return f"; did you mean {found[0]}?" if found else ""
@@ -177,9 +177,9 @@ def compare_panels(directories: Sequence[Path], options: PlotOptions = PlotOptio
 
 def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
     found: list[Panel] = []
-    if (directory / KINDS["run"]).is_file():
+    if (directory / outputs.RUN.table).is_file():
         found += options.choose(histories.panels_of_run(PlottedRun(directory), options.over))
-    if (directory / KINDS["curve"]).is_file() and options.wants("steady"):
+    if (directory / outputs.STEADY.table).is_file() and options.wants("steady"):
         found += band_charts.panels_of_curve(directory, options.over)
     return found
 
@@ -198,7 +198,7 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
     """Return the keys in which cases of one sweep differ, such as `velocity 1 m/s, seed 2`; [] for other
     directories."""
     paths = [directory.absolute() for directory in directories]
-    table = paths[0].parent.parent / KINDS["sweep"] if paths else Path()
+    table = paths[0].parent.parent / outputs.SWEEP.table if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
         return []
     known = {f"{int(row['case']):03d}": row for row in read_cases(table)}

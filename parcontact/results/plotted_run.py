@@ -8,11 +8,12 @@ import numpy as np
 
 from .. import printed
 from ..errors import InputError
-from ..files.fields import SavedFields
+from ..files import outputs
+from ..files.fields import SavedMaps
 from ..files.hdf5 import MEND
 from ..job import Job
 from ..job.history import Timeline
-from ..job.reading import RESOLVED, shown_job
+from ..job.reading import shown_job
 from ..parallel.slab import Array
 from .panels import Axis
 from .results import Results
@@ -43,7 +44,7 @@ class PlottedRun(Results):
     @cached_property
     def job(self) -> Job:
         """Job of the run."""
-        return shown_job(self.path / RESOLVED)
+        return shown_job(self.path / outputs.RUN.resolved)
 
     @property
     def load(self) -> tuple[Axis, Array]:
@@ -119,7 +120,7 @@ class PlottedRun(Results):
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
-class Fields(SavedFields):
+class Fields(SavedMaps):
     """The saved maps of a run: `shown` are the instants to draw, `chosen` is the one whose maps are drawn (default: the
     last).
 

@@ -16,7 +16,7 @@ from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, val
 from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
-from ..files import files, hdf5, tables
+from ..files import files, hdf5, outputs, tables
 from ..files.tables import Wanted
 from ..job import Job
 from ..job.history import Span, Timeline
@@ -36,7 +36,6 @@ ONE_ROUGH = (
     "shapes with it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
 OF_SPECTRA = "surface: the theory takes the spectra of rough shapes, and this job has a measured map in addition"
-STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
@@ -68,7 +67,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
 
 def _times_of_run(job: Job) -> dict[int, float]:
     """Return the times at which the steps of the job's run ended, by their numbers; none before the run."""
-    path = job.output.directory / "measures.csv"
+    path = job.output.directory / outputs.RUN.table
     if not Timeline.from_job(job).chooses or not path.is_file():
         return {}
     columns = tables.read_columns(path)
@@ -152,8 +151,8 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
     """Write the predictions of a friction curve to steady_theory.csv. Return the point of the highest friction."""
     rows = list(predict_steady(job, wanted))
     if job.bands is not None:
-        _write(job.output.directory / BANDS_FILE, BANDS_THEORY, predict_bands(job, wanted))
-    _write(job.output.directory / STEADY_FILE, STEADY_THEORY, rows)
+        _write(job.output.directory / outputs.BANDS_THEORY, BANDS_THEORY, predict_bands(job, wanted))
+    _write(job.output.directory / outputs.STEADY_THEORY, STEADY_THEORY, rows)
     return max(rows, key=lambda row: row.friction)
 
 
@@ -167,7 +166,7 @@ def draw_curve(job: Job, wanted: Request) -> Path:
 def _draw(job: Job) -> Path:
     from . import plots
 
-    return plots.draw_steady(job.output.directory / "steady.csv")
+    return plots.draw_steady(job.output.directory / outputs.STEADY.table)
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
@@ -191,18 +190,18 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     if not has_spectrum(job):
         raise InputError(f"{ONE_ROUGH.partition(';')[0]}" if job.bands is None else OF_SPECTRA)
     highest = write_steady(job, request(job))
-    if (job.output.directory / "steady.csv").is_file():
+    if (job.output.directory / outputs.STEADY.table).is_file():
         _draw(job)
     place = Wanted(highest.velocity, highest.pressure, highest.temperature)
     return [
-        f"Persson's theory, {settings.sentence}: {job.output.directory / STEADY_FILE}",
+        f"Persson's theory, {settings.sentence}: {job.output.directory / outputs.STEADY_THEORY}",
         f"Persson's theory predicts a highest friction of {highest.friction:.3g}, at {place}",
     ]
 
 
 def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
     """Write the predictions for a job to theory.csv, with theory.yaml. Return the path of the table."""
-    return _write(job.output.directory / theory_table.TABLE, THEORY, rows, settings)
+    return _write(job.output.directory / outputs.THEORY.table, THEORY, rows, settings)
 
 
 def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySettings | None = None) -> Path:

@@ -18,7 +18,7 @@ from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
 from ..columns import STEADY, SWEEP, UNITS
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
-from ..files import hdf5
+from ..files import hdf5, outputs
 from ..job import Dma, Indenter, Job, Zener, listing
 from ..job.listing import answers
 from ..job.meaning import excited_band
@@ -42,7 +42,7 @@ from .curve_tables import (
 )
 from .panels import Axis, Line, Panel, Shade
 from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
-from .results import MAPS, PLACES, STATES, Results, read_cases
+from .results import PLACES, Results, read_cases
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -93,21 +93,21 @@ def _more_pictures(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the section on a friction curve: its points and their maps."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     columns = curve.table
     names = [name for name in POINTS if name in columns]
     head = [_to_words(_add_unit(name)) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_panel(panel) for panel in band_charts.panels_of_curve(directory)]
     states = partial(_label_states, curve.free_area)
-    browsers = _browse_file(curve, STATES, states, curve.job) if curve.job else []
+    browsers = _browse_file(curve, outputs.STEADY.maps, states, curve.job) if curve.job else []
     return ReportSection("Friction curve", (), [table, *_list_main_bands(curve)], pictures, browsers)
 
 
 def describe_friction(directory: Path) -> ReportSection:
     """Return the first section on a friction curve: friction by speed and temperature, unsolved points and why, and the
     lengths, frequencies and moduli that matter."""
-    curve = Results(directory, "curve")
+    curve = Results(directory, "steady")
     sentences = [f"The curve has {curve.lost}."] if curve.lost else []
     sentences += [f"{text[:1].upper()}{text[1:]}." for text in curve.unfinished if text != curve.lost]
     return ReportSection("Friction", sentences, [*friction_tables(curve), *scales_table(curve)])
@@ -115,7 +115,7 @@ def describe_friction(directory: Path) -> ReportSection:
 
 def _list_main_bands(curve: Results) -> list[ReportTable]:
     """Return a table of the band with most friction at each point of a curve in bands."""
-    if "velocity" not in (columns := curve.read("bands.csv")):  # none, or one of a history
+    if "velocity" not in (columns := curve.read(outputs.BANDS)):  # none, or one of a history
         return []
     names = [name for name in PLACES if any(value == value for value in columns[name])]
     points: dict[tuple[str, ...], list[int]] = {}
@@ -186,7 +186,7 @@ def format_cell(value: object) -> str:
 
 def browse_run(run: PlottedRun) -> list[Browser]:
     """Return browsers of all saved maps of a run, which step through time."""
-    return _browse_file(run, MAPS, partial(label_frames, run), run.job, run.telling_step)
+    return _browse_file(run, outputs.RUN.maps, partial(label_frames, run), run.job, run.telling_step)
 
 
 def _browse_file(

@@ -20,11 +20,11 @@ import numpy as np
 
 from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
 from ..errors import InputError
-from ..files import fields, hdf5, tables
+from ..files import fields, hdf5, outputs, tables
 from ..files.tables import Claim, Columns
 from ..job import Job, Zener, yaml_text
 from ..job.listing import answers
-from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
+from ..job.reading import CASES, shown_job
 from ..parallel.slab import Array
 from ..printed import quantity
 from .slide import ERRORS
@@ -32,16 +32,8 @@ from .slide import ERRORS
 if TYPE_CHECKING:
     import xarray
 
-KINDS = {  # tables of the kinds of results
-    "run": "measures.csv",
-    "curve": "steady.csv",
-    "sweep": "sweep.csv",
-    "study": "study.csv",
-    "leak": "leak.csv",
-}
-JOBS = {"run": RESOLVED, "curve": STEADY_RESOLVED, "study": "study.resolved.yaml"}
-MAPS, STATES = "fields.h5", "steady.h5"  # maps of a run over time, and of the points of a curve
-CURVES = "sweep_curves.csv"  # the points of all friction curves of a sweep
+JOBS = [each.resolved for each in outputs.BY_VERB.values() if each.copies]
+CURVES = outputs.SWEEP.tables[0]  # the points of all friction curves of a sweep
 PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *ERRORS, "residual")
@@ -80,7 +72,7 @@ class ResultTable(Columns):
 
 
 class Results:
-    """Results in a directory, of a `kind`: run, curve, sweep, study or leak; by default the first kind that exists.
+    """Results in a directory, of a `kind`: run, steady, sweep, study or theory; by default the first kind that exists.
 
     A given `job`, and a text on how the surfaces `detached`, replace what is stored. Tables, maps and job are read when
     they are used, and raise InputError if they are damaged.
@@ -88,7 +80,7 @@ class Results:
 
     def __init__(self, path: str | Path, kind: str = "", job: Job | None = None, detached: str = "") -> None:
         self.path, self._job, self._detached = Path(path), job, detached
-        self.kinds = tuple(each for each, name in KINDS.items() if self.has(name))
+        self.kinds = tuple(kind for kind, each in outputs.BY_VERB.items() if self.has(each.table))
         self.kind = kind or next(iter(self.kinds), "")
 
     def has(self, name: str) -> bool:
@@ -104,29 +96,29 @@ class Results:
     def table(self) -> ResultTable:
         """Table of the results of this kind, with units; of a sweep, the columns that are numbers."""
         if self.kind != "sweep":
-            return self.read(KINDS[self.kind])
+            return self.read(outputs.BY_VERB[self.kind].table)
         rows = self.cases
         numbers = [name for name in (rows[0] if rows else ()) if all(isinstance(row[name], float) for row in rows)]
-        return ResultTable(self.path / KINDS["sweep"], ((name, [row[name] for row in rows]) for name in numbers))
+        return ResultTable(self.path / outputs.SWEEP.table, ((name, [row[name] for row in rows]) for name in numbers))
 
     @cached_property
     def job(self) -> Job | None:
         """Job of the results, with flat shapes in place of files; None if no job is stored."""
         if self._job is not None:
             return self._job
-        wanted = {"curve": (STEADY_RESOLVED, RESOLVED), "sweep": self._jobs_of_cases}.get(self.kind)
-        names = wanted or (JOBS.get(self.kind, RESOLVED),)
+        own = outputs.BY_VERB.get(self.kind, outputs.RUN)
+        names = self._jobs_of_cases if self.kind == "sweep" else (*own.copies[1:], outputs.RUN.resolved)
         return next((shown_job(self.path / name) for name in names if self.has(name)), None)
 
     @property
     def _jobs_of_cases(self) -> tuple[str, ...]:
-        found = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(self.path.glob(f"{CASES}/*/{name}")))
+        found = (path for name in JOBS[:2] for path in sorted(self.path.glob(f"{CASES}/*/{name}")))
         return tuple(str(path.relative_to(self.path)) for path in found)
 
     @property
     def job_file(self) -> Path | None:
         """Path of the stored job with all defaults; of a sweep, the job of the first case; None if there is none."""
-        return next((self.path / name for name in (*JOBS.values(), *self._jobs_of_cases) if self.has(name)), None)
+        return next((self.path / name for name in (*JOBS, *self._jobs_of_cases) if self.has(name)), None)
 
     @property
     def title(self) -> str:
@@ -138,9 +130,9 @@ class Results:
 
     def plain_job(self) -> dict[str, Any]:
         """Return the stored job of a run or a curve as plain data; raises InputError if there is none."""
-        found = next((self.path / name for name in (RESOLVED, STEADY_RESOLVED) if self.has(name)), None)
+        found = next((self.path / name for name in JOBS[:2] if self.has(name)), None)
         if found is None:
-            raise InputError(f"{self.path} has no run: it has neither {RESOLVED} nor {STEADY_RESOLVED}")
+            raise InputError(f"{self.path} has no run: it has neither {' nor '.join(JOBS[:2])}")
         return dict(yaml_text.read_source(found, str(found)).data)
 
     @property
@@ -185,18 +177,18 @@ class Results:
     @cached_property
     def cases(self) -> Rows:
         """Rows of the cases of a sweep."""
-        return read_cases(self.path / KINDS["sweep"]) if self.has(KINDS["sweep"]) else []
+        return read_cases(self.path / outputs.SWEEP.table) if self.has(outputs.SWEEP.table) else []
 
     @property
     def points(self) -> Path:
         """Path of the table with the results of a sweep: of its cases, or of the points of its curves."""
         known = any(math.isfinite(row.get("residual", math.nan)) for row in self.cases)
-        return self.path / (CURVES if self.has(CURVES) and not known else KINDS["sweep"])
+        return self.path / (CURVES if self.has(CURVES) and not known else outputs.SWEEP.table)
 
     @property
     def study_rows(self) -> Rows:
         """Rows of a study, without fingerprints."""
-        path = self.path / KINDS["study"]
+        path = self.path / outputs.STUDY.table
         tables.refuse_cut(path)
         with path.open(newline="") as file:
             rows = list(csv.DictReader(file))
@@ -215,7 +207,7 @@ class Results:
         """Sentences on missing results with reasons: points of a curve, cases of a sweep, steps of a run."""
         if self.kind == "sweep":
             return [*self.failed_cases(), *self._cases_to_go()]
-        return list(self._lost_points() if self.kind == "curve" else self._steps_to_go())
+        return list(self._lost_points() if self.kind == "steady" else self._steps_to_go())
 
     def _cases_to_go(self) -> Iterator[str]:
         if count := sum(row["state"] in ("-", "begun") for row in self.cases):
@@ -225,7 +217,7 @@ class Results:
         if lost := tables.name_lost(self.path):
             yield lost
         section = self.job.steady if self.job else None
-        if section and section.velocities and section.pressures and self.has(KINDS["curve"]):
+        if section and section.velocities and section.pressures and self.has(outputs.STEADY.table):
             asked = tables.requested_points(section.velocities, section.pressures, section.temperatures or ())
             there = [*tables.of_table(self.table), *(one.at for one in tables.read(self.path))]
             if count := len(tables.lacking_points(asked, there)):
@@ -254,14 +246,14 @@ class Results:
         """Text on the points of a curve that could not be solved; '' if there are none."""
         return tables.name_lost(self.path)
 
-    def open_maps(self, name: str = MAPS) -> h5py.File:
+    def open_maps(self, name: str = outputs.RUN.maps) -> h5py.File:
         """Open a file of maps; raises FileNotFoundError, and InputError if it is damaged."""
         return hdf5.open_results(self.path / name)
 
     @property
     def program(self) -> str:
         """Version of the program in the saved maps; '' without maps."""
-        for name in (MAPS, STATES):
+        for name in outputs.MAPS:
             with suppress(*hdf5.FAILURES, InputError), self.open_maps(name) as file:
                 return str(file.attrs["program"])
         return ""
@@ -274,17 +266,17 @@ class Results:
             import xarray
         except ImportError as error:
             raise ImportError(NO_XARRAY) from error
-        return xarray.Dataset(*self._maps()) if self.has(MAPS) else xarray.Dataset()
+        return xarray.Dataset(*self._maps()) if self.has(outputs.RUN.maps) else xarray.Dataset()
 
     def _maps(self) -> tuple[dict[str, Any], dict[str, Any]]:
         from xarray.core.indexing import LazilyIndexedArray
 
         from .saved_map import SavedMap
 
-        path = self.path / MAPS
+        path = self.path / outputs.RUN.maps
         try:
             with h5py.File(path, "r") as file:
-                layout = fields.SavedFields(file)
+                layout = fields.SavedMaps(file)
                 saved = np.array(layout.saved, dtype=int)
                 places = {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
                 steps = ("t", file["step"][...][saved], {"units": "1"})
@@ -317,7 +309,7 @@ class Results:
             whole = sum(stage.seconds for stage in job.history)
             share = f" of {quantity(whole, 's')}" if whole else ""
             return f"step {self.table['step'][-1]:g}, t = {quantity(self.table['time'][-1], 's')}{share}"
-        if self.kind == "curve":
+        if self.kind == "steady":
             return "; ".join([f"{len(self.table['velocity'])} points", *self.unfinished])
         return ""
 
@@ -367,7 +359,7 @@ def read_cases(path: Path) -> Rows:
         rows = [dict(zip(names, line, strict=True)) for line in lines]
         begun = [int(one.name) for one in path.parent.glob(f"{CASES}/*") if one.name.isdecimal()]
         last = max((int(row["case"]) for row in rows), default=-1)
-        if path.name == KINDS["sweep"] and max(begun, default=-1) > last:
+        if path.name == outputs.SWEEP.table and max(begun, default=-1) > last:
             raise ValueError(f"it lacks rows: case {max(begun)} has begun")
         return [
             {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}

@@ -13,12 +13,12 @@ from typing import Any
 
 from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_of, to_csv
 from ..errors import InputError
-from ..files import files, tables
+from ..files import files, outputs, tables
 from ..job import Case, Steady
 from ..job.history import Timeline
 from ..job.listing import answers
 from . import slide
-from .results import CURVE_COLUMNS, CURVE_RESULTS, CURVES, FAILURE, KINDS, PLACES, Results
+from .results import CURVE_COLUMNS, CURVE_RESULTS, CURVES, FAILURE, PLACES, Results
 
 RESULTS = names_of(SWEEP_RESULTS)
 SECTIONS = {column.when: added_names(SWEEP, column.when) for column in SWEEP if column.when}
@@ -26,7 +26,7 @@ FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(name for name in names_of(SWEEP) if name.startswith("theory_"))
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys that choose samples of one surface, over which means are taken
-FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # first columns of tables
+FIRST = {outputs.RUN.table: ("step", "time"), outputs.STEADY.table: ("velocity", "pressure")}  # first columns of tables
 DAMAGED = "damaged"
 
 
@@ -41,7 +41,7 @@ def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
         names = names_of(choose_columns(SWEEP, when=there))[1:]
         if not any(case.job.history for case in cases):  # curves have a table of points instead
             names = tuple(name for name in names if any(name in row for row in rows))
-        save_cases(directory / KINDS["sweep"], ["case", *keys, *names], rows)
+        save_cases(directory / outputs.SWEEP.table, ["case", *keys, *names], rows)
         if points:
             save_cases(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
@@ -89,7 +89,7 @@ def _row(case: Case) -> dict[str, Any]:
 
 def _results(case: Case) -> dict[str, Any]:
     directory, row = case.job.output.directory, dict[str, Any]()
-    for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
+    for prefix, name in (("", outputs.RUN.table), ("theory_", outputs.THEORY.table)):
         columns = _columns(directory / name) or {"time": []}
         if len(columns["time"]) < 2 and not prefix:  # the initial state only
             continue
@@ -122,7 +122,7 @@ def _last(values: Sequence[float]) -> float:
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
     """Yield the rows of the finished points of a friction curve."""
-    if columns := _columns(case.job.output.directory / "steady.csv"):
+    if columns := _columns(case.job.output.directory / outputs.STEADY.table):
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
         for k, place in enumerate(tables.of_table(columns)):
@@ -147,7 +147,7 @@ def state(case: Case) -> str:
         return DAMAGED
     if (directory / FAILURE).is_file():
         return "failed"
-    table = directory / ("measures.csv" if case.job.history else "steady.csv")
+    table = directory / (outputs.RUN if case.job.history else outputs.STEADY).table
     if not table.is_file():
         return "-"
     if not (columns := _columns(table)):

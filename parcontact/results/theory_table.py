@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 from .. import __version__
 from ..errors import InputError
-from ..files import files
+from ..files import files, outputs
 from ..job import Stage, yaml_text
 from ..printed import with_error
 from . import slide
 from .results import Results
 
-TABLE, FILE = "theory.csv", "theory.yaml"
+(FILE,) = outputs.THEORY.others
 HEAD = "# Settings of `parcontact theory` for theory.csv"
 TEXT = (
     f"{HEAD}.\n"
@@ -81,7 +81,7 @@ def read_settings(directory: Path) -> TheorySettings | None:
 
 def shared(directories: Iterable[Path]) -> TheorySettings | None:
     """Return the settings that the theory tables in these directories share, or None. Raises as `read_settings`."""
-    found = {read_settings(directory) for directory in directories if (directory / TABLE).is_file()}
+    found = {read_settings(directory) for directory in directories if (directory / outputs.THEORY.table).is_file()}
     return found.pop() if len(found) == 1 else None
 
 
@@ -93,9 +93,6 @@ def describe_settings(directory: Path) -> str:
     except InputError as error:
         return f"theory of unknown settings: {error}"
     return f"Persson's theory: {settings.sentence}" if settings else ""
-
-
-RUN = "measures.csv"
 
 
 class ComparedResult(NamedTuple):
@@ -115,7 +112,7 @@ def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) 
     Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), with the corrected area
     for the run; without a slide, the contact area of the last instant. Raises InputError for damaged tables.
     """
-    predicted, found = (_results(directory / name, history, cell) for name in (TABLE, RUN))
+    predicted, found = (_results(directory / name, history, cell) for name in (outputs.THEORY.table, outputs.RUN.table))
     nothing = None, math.nan
     return [ComparedResult(name, value, *found.get(name, nothing)) for name, (value, _) in predicted.items()]
 

@@ -81,13 +81,13 @@ def test_friction_over_speed_and_temperature(curve: Path) -> None:
     """A table for each pressure; a point that is lost is named, one that is to come is a dash."""
     lost = '[{"velocity": 0.1, "pressure": 3e5, "temperature": 20, "why": "no"}]'
     (curve / "steady.lost.json").write_text(lost)
-    tables = curve_tables.friction_tables(Results(curve, "curve"))
+    tables = curve_tables.friction_tables(Results(curve, "steady"))
     assert [table.caption for table in tables] == [f"friction under {p} kPa" for p in (100, 200, 300)]
     assert all(list(table.head) == ["velocity", "at 20 °C", "at 40 °C"] for table in tables)
     assert list(tables[0].rows[0]) == ["100 mm/s", "2.00 ± 0.20", "4.00 ± 0.40"]
     assert list(tables[1].rows[2]) == ["10 m/s", "200 ± 20", "–"]
     assert list(tables[2].rows[0]) == ["100 mm/s", "not solved", "–"]
-    scales = {row[0]: row[1] for row in curve_tables.scales_table(Results(curve, "curve"))[0].rows}
+    scales = {row[0]: row[1] for row in curve_tables.scales_table(Results(curve, "steady"))[0].rows}
     assert scales["frequencies that the job excites at 40 °C"] == "100 Hz to 10 kHz"
     assert scales["measured frequencies, at the reference temperature"] == "50 Hz to 3 kHz"
     (compared,) = curve_tables.compared_table([curve, curve], ["soft", "hard"])
@@ -98,7 +98,7 @@ def test_friction_over_speed_and_temperature(curve: Path) -> None:
 def test_a_headline_names_the_conditions_and_that_friction_still_rises(curve: Path) -> None:
     said = info.find_headline(curve)
     assert said.endswith("is 400 ± 40, at 10 m/s and 100 kPa, 40 °C; it still rises at the highest velocity.")
-    assert Results(curve, "curve").unfinished == ["1 of 12 points are not solved yet"]
+    assert Results(curve, "steady").unfinished == ["1 of 12 points are not solved yet"]
 
 
 def test_how_far_a_running_sweep_is(curve: Path) -> None:

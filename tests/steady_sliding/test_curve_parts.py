@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from parcontact import __main__
 from parcontact.contact.splitting import SteadySolver
+from parcontact.files.fields import SteadyMaps
 from parcontact.files.tables import read_columns
 from parcontact.march.mesh import load_cases
 from parcontact.march.steady import SteadySliding
@@ -308,6 +309,41 @@ def test_maps_of_points_that_are_there(main: Main, tmp_path: Path, solved: list[
     assert (tmp_path / "out" / "steady.csv").read_bytes() == before
     with h5py.File(tmp_path / "out" / "steady.h5") as file:
         assert np.allclose(file["pressure"][...].mean(axis=(1, 2)), [pressure for _, pressure in ALL], rtol=1e-9)
+
+
+def test_more_points_keep_the_maps_of_others(
+    main: Main, tmp_path: Path, solved: list[tuple[float, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A longer list of speeds, stopped within, solves new points only; other kinds of maps begin a new file."""
+    path, fields = tmp_path / "out" / "steady.h5", ("--set", "output.fields=[pressure]")
+    assert main(*CURVE, *fields)[0] == DONE
+    with h5py.File(path) as file:
+        first = file["pressure"][...]
+    more = ("steady", "job.yaml", "--out", "out", "--pressures", "2e5", "--velocities", "0.05,0.1,0.2")
+    save = SteadyMaps.save
+
+    def killed(self: SteadyMaps, index: int, maps: Any) -> None:
+        if len(solved) == len(ALL) + 2:
+            raise KeyboardInterrupt
+        save(self, index, maps)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SteadyMaps, "save", killed)
+        with pytest.raises(SystemExit):
+            main(*more, *fields)
+    assert main(*more, *fields)[0] == DONE
+    assert [speed for speed, _ in solved[len(ALL) :]] == [0.05, 0.2, 0.2]
+    with h5py.File(path) as file:
+        places = list(zip(file["velocity"][...], file["load"][...], strict=True))
+        maps = file["pressure"][...]
+    assert places == [(0.05, 2e5), (0.1, 2e5), (0.2, 2e5), *(one for one in ALL if one != (0.1, 2e5))]
+    for (speed, load), rows in zip(places, maps, strict=True):
+        assert rows.mean() == pytest.approx(load, rel=1e-9)
+        if (speed, load) in ALL:
+            assert np.array_equal(rows, first[ALL.index((speed, load))])
+    assert main(*CURVE, "--set", "output.fields=[gap]")[0] == DONE
+    assert len(solved) == 2 * len(ALL) + 3
+    assert path.with_name("steady.h5.aside").is_file()
 
 
 def test_kernel_of_cells(main: Main, tmp_path: Path) -> None:

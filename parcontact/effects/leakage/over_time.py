@@ -26,9 +26,9 @@ from scipy.interpolate import PchipInterpolator
 
 from ...columns import choose_columns, names_of, to_csv, values_of
 from ...errors import InputError
-from ...files import files, hdf5
+from ...files import files, hdf5, outputs
 from ...job import reading
-from ...job.reading import RESOLVED, shown_job
+from ...job.reading import shown_job
 from ...march import scene
 from ...parallel.mpi import MPI
 from ...parallel.root import on_root
@@ -229,13 +229,13 @@ class Gaps:
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
-        if not (directory / "measures.csv").is_file():
+        if not (directory / outputs.RUN.table).is_file():
             what = (
                 "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
             )
             raise InputError(f"{directory} is no {what}")
-        self.directory, self.results = directory, Results(directory, "run", shown_job(directory / RESOLVED))
-        self.job = shown_job(directory / RESOLVED)
+        self.directory, self.results = directory, Results(directory, "run", shown_job(directory / outputs.RUN.resolved))
+        self.job = shown_job(directory / outputs.RUN.resolved)
         job = self.job
         self.size, self.periodic = job.grid.size, job.grid.cyclic
         self.cells = job.grid.nx * job.grid.ny
@@ -243,11 +243,11 @@ class Gaps:
         try:
             with self.results.open_maps() as file:
                 if not {"gap", "pressure"} <= set(file):
-                    raise InputError(f"{directory / 'fields.h5'}: {NEEDS}")
+                    raise InputError(f"{directory / outputs.RUN.maps}: {NEEDS}")
                 self.fields = Fields(file, at)
                 self.shown = self.fields.shown
         except hdf5.FAILURES as error:
-            raise InputError(f"{directory / 'fields.h5'} cannot be read: {hdf5.reason(error)}; {NEEDS}") from None
+            raise InputError(f"{directory / outputs.RUN.maps} cannot be read: {hdf5.reason(error)}; {NEEDS}") from None
         if not self.shown:
             raise InputError(f"{directory}: no map is saved yet")
 
@@ -257,13 +257,15 @@ class Gaps:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = self.fields.steps[index]
-            raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are incomplete or not finite")
+            raise InputError(
+                f"{self.directory / outputs.RUN.maps}: the maps after step {step} are incomplete or not finite"
+            )
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> FloatMap:
         """Return the map of the gap [m] of the undeformed surface that just touches; raises InputError without its
         heights."""
-        job = reading.load(self.directory / RESOLVED)
+        job = reading.load(self.directory / outputs.RUN.resolved)
         setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
