@@ -171,7 +171,10 @@ def _run(add: Add) -> None:
         "stage"
     )
     add("--until", metavar="T", type=seconds, help=text)
-    text = "stop early with a checkpoint, so that the run ends within this wall time"
+    text = (
+        "stop early with a checkpoint, so that the run ends within this wall time, of which 5 s and twice the longest "
+        "step are kept in reserve"
+    )
     add("--wall", metavar="HH:MM:SS", type=wall, help=text)
 
 

@@ -105,6 +105,8 @@ class SweepRun:
             slab = Slab(self.groups.comm, *case.job.grid.points)
             speaks = slab.root and not self.quiet
             if reason := self._reason_to_stop(slab, signals):
+                if slab.root and self.runs:
+                    self._collect()
                 if speaks:
                     print_line(f"stopped before case {case.number}: {reason}; run again to go on")
                 return [*codes, self._stop_others(slab)]

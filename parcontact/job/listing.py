@@ -115,7 +115,7 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
                 yield f"{name}.{index}", listed_line(item), ""
                 if index == 0 and len(shown) < len(value):
                     yield f"{name}.1 to {len(value) - 2}", "are in job.resolved.yaml", ""
-        else:
+        elif value != "":
             yield name, text(value), _unit_of(value, part, key)
 
 

@@ -244,6 +244,12 @@ def _sweep(found: Results) -> Iterator[str]:
     yield f"  sweep of {states.total()} cases: {counts}"
     yield from _describe_running(found)
     yield from (f"  {text}" for text in found.failed_cases(SHOWN))
+    done = [int(row["case"]) for row in rows if row["state"] == "done"]
+    for number in done[:SHOWN]:
+        if text := find_headline(found.path / CASES / f"{number:03d}"):
+            yield f"  case {number}: {text}"
+    if len(done) > SHOWN:
+        yield f"  and {len(done) - SHOWN} more"
 
 
 def _describe_running(sweep: Results) -> Iterator[str]:

@@ -222,6 +222,7 @@ def test_check_reads_a_measured_road(main: Main, tmp_path: Path) -> None:
 def test_help_is_a_verb(main: Main) -> None:
     assert main("help") == main("--help")
     assert main("help", "plan") == main("plan", "--help")
+    assert f"{run.RESERVE_SECONDS:g} s and twice the longest step" in " ".join(main("help", "run")[1].split())
 
 
 def test_options_may_come_first(main: Main, tmp_path: Path) -> None:

@@ -155,6 +155,7 @@ def test_resolved_round_trip(tmp_path: Path, text: str) -> None:
 
 def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
     (tmp_path / "road.npy").touch()
+    assert describe_job(job_of(tmp_path, SMALL)).startswith("grid.points")  # without a title
     table = " ".join(describe_job(job_of(tmp_path, CONTRACT)).split())
     for part in (
         "grid.points [1024, 1024]", "grid.size [0.001, 0.001] m", "material.modulus_inf 1e+06 Pa", "rms_slope 0.02,",

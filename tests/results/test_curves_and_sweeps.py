@@ -1,6 +1,7 @@
 """Tables for other programs and for reports, from a made-up curve, and how far a sweep is."""
 
 import csv
+import shutil
 from itertools import product
 from pathlib import Path
 
@@ -72,6 +73,14 @@ def test_leakage_over_the_load(tmp_path: Path) -> None:
         list(export.export_results(tmp_path, "abaqus"))
     with pytest.raises(InputError, match="is not a directory"):
         list(export.export_results(tmp_path / "nowhere", "csv"))
+    (tmp_path / "leak.csv").unlink()
+    columns = "step,time,pressure,flow_x,flow_y"
+    (tmp_path / "measures.csv").write_text(f"{columns}\n0,0,0,,\n1,1,1,7,8\n2,2,2,,\n")  # of `leakage: {every: 2}`
+    list(export.export_results(tmp_path, "csv"))
+    assert (tmp_path / "conductivity.csv").read_text().splitlines() == [head, "1.0,7.0,8.0"]
+    (tmp_path / "measures.csv").write_text("step,time,pressure\n0,0,0\n")
+    with pytest.raises(InputError, match="has no table for csv"):
+        list(export.export_results(tmp_path, "csv"))
 
 
 # -- the first tables of a report ------------------------------------------------------------------------------------
@@ -116,3 +125,13 @@ def test_how_far_a_running_sweep_is(curve: Path) -> None:
     assert "case 1: step 1, t = 500 ms of 2 s" in said
     assert "2 cases to go: 40 s" in said
     assert info.find_headline(home).endswith("to 5 (case 4); it still rises at the highest velocity.")
+
+
+def test_a_sweep_of_curves_has_the_headline_of_each_case(curve: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    home = tmp_path_factory.mktemp("sweep")
+    shutil.copytree(curve, home / "cases" / "000")
+    (home / "sweep.csv").write_text("case,material.poisson,state\n0,0.5,done\n")
+    said, sound = info.describe_path(home)
+    assert sound
+    assert f"  case 0: {info.find_headline(home / 'cases' / '000')}" in said.splitlines()
+    assert "case 0: The highest friction of the curve is 400 ± 40" in said

@@ -185,6 +185,8 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
         limit, alone = run.limit_time(run.age() + seconds, {}), Groups(MPI.COMM_SELF)
         assert sweep.SweepRun(cases[:2], alone, act, sweep.stop_file(cases), limit=limit).run(cases[:2]) == code
         assert len(begun) == (0 if code else 2)
+        described, _ = info.describe_path(cases[0].job.output.directory.parents[1])
+        assert "sweep of 2 cases: 2 not begun" in described
     said = capsys.readouterr().out.splitlines()[0]
     assert said == "stopped before case 0: the wall time is nearly used up; run again to go on"
 

@@ -100,10 +100,12 @@ def _describe_leak(columns: Columns, row: int) -> str:
 def exported(run: Results) -> list[ExportedTable]:
     """Return tables of the conductivities by load for other programs, the last row for equal loads; none without
     leak.csv."""
-    columns = run.read(TABLE)
+    columns = run.read(TABLE) or run.table
     names = [name for name in EXPORTED if name in columns]
-    loads = [float(f"{load:.9g}") for load in columns.get("pressure", ())]  # without rounding errors
-    rows = {load: [load, *(columns[name][k] for name in names[1:])] for k, load in enumerate(loads)}
+    flows = () if "high_pressure" in columns else columns.get("flow_x", ())
+    known = [row for row, flow in enumerate(flows) if flow == flow]
+    loads = {float(f"{columns['pressure'][row]:.9g}"): row for row in known}  # without rounding errors
+    rows = {load: [load, *(columns[name][row] for name in names[1:])] for load, row in loads.items()}
     head = [EXPORTED[name] for name in names]
     return [ExportedTable("conductivity", head, [rows[load] for load in sorted(rows)])] if rows else []
 
