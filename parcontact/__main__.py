@@ -16,15 +16,13 @@ from typing import NoReturn
 
 from .door import verbs
 from .door.arguments import parse_arguments, without_restart
-from .door.verbs import BAD_INPUT, DONE, FAILED
-from .errors import InputError, JobError, RunError
+from .errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, InputError, JobError, RunError
 from .files import files
 from .parallel.root import STOP
 from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # delay of the other ranks before they print, so that root prints a common error first [s]
 WAIT_SECONDS = 5.0  # longest time that a failing rank waits for the others to fail with the same error [s]
-AGAIN = 3  # exit code: stopped early, run again
 LEAVE_FILES = {
     "run",
     "steady",
@@ -116,7 +114,7 @@ def _leave_code(code: int, words: Sequence[str] = ()) -> int:
     If the run can be continued, the words of the command line that does so follow, one per line.
     """
     if verbs.is_root() and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
-        more = without_restart(words) if code == AGAIN else []
+        more = without_restart(words) if code == STOPPED_EARLY else []
         with suppress(OSError):
             Path(path).write_text("".join(f"{line}\n" for line in (code, *more)))
     return code
@@ -145,7 +143,7 @@ def _end_all(error: BaseException) -> NoReturn:
     if not verbs.is_root():
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
-    code = AGAIN if isinstance(error, KeyboardInterrupt) else FAILED
+    code = STOPPED_EARLY if isinstance(error, KeyboardInterrupt) else FAILED
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     said = f": {error}" if str(error) else ""
     reason = _describe_surroundings(error) or f"ended by {type(error).__name__}"

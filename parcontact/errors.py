@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+DONE, FAILED, BAD_INPUT, STOPPED_EARLY = range(4)  # exit codes; stopped early: with a good checkpoint, run again
+
 
 class InputError(Exception):
     """Bad input, described in one sentence: the program ends with exit code 2 and writes nothing."""

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from parcontact import job
 from parcontact.__main__ import main
 from parcontact.files import run
-from parcontact.files.run import Options
+from parcontact.files.stopping import Options
 from parcontact.parallel.slab import Slab
 
 WAVE = """

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from parcontact import job
 from parcontact.files import run, tables
-from parcontact.files.run import Options
+from parcontact.files.stopping import Options
 from parcontact.parallel.slab import Slab
 
 ROUGH = {

@@ -26,7 +26,7 @@ from .. import capabilities, errors
 from ..errors import RunError
 from ..files import provenance, run
 from ..files.recorder import StepRow
-from ..files.run import Options
+from ..files.stopping import Options
 from ..job import Job, load
 from ..job.history import Timeline
 from ..march import steady

@@ -32,13 +32,9 @@ from ..errors import InputError, JobError, RunError
 from ..files import wisdom
 from ..files.tables import Wanted
 from ..job import Job, log_range
-from ..job.advice import more_points
 from ..job.history import Timeline
-from ..job.listing import answers
 from ..march import curve, mesh, sanity
-from ..march.curve import describe_missed
 from ..march.point import Point
-from ..march.sanity import ContactWatch
 from ..march.scene import Setup, set_up
 from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
@@ -269,16 +265,14 @@ def steady(
     for doubt in sliding.doubts(wanted.temperatures):
         if slab.root:
             warn(doubt)
-    contacts = ContactWatch(found.numerics.strict, sliding.setup.choices.timeline, more=more_points(found.grid))
+    contacts = curve.watch_contacts(sliding.setup)
     points: list[Point | None] = []
     failures: list[str] = []
     doubts: list[Doubt] = []
     for at in wanted.points:
         point = None
         try:
-            if wanted.temperatures:
-                sliding.set_temperature(at.temperature)
-            point = sliding.solve(wanted.velocity(at.speed), at.pressure)
+            point = curve.solve_point(sliding, wanted, at)
         except RunError as error:
             failures.append(str(error))
             doubts.append(WARN_UNSOLVED_POINT("", {"where": str(error)}))
@@ -286,9 +280,7 @@ def steady(
         points.append(point)
         doubts += contacts.check_point(point.measures, str(at)) if point else []
     solved = [point for point in points if point]
-    of_points = [doubt for doubts_of in answers("steady", "doubts_of_points") for doubt in doubts_of(solved, found)]
-    of_points += describe_missed(solved, found)
-    for doubt in (*doubts, *of_points) if slab.root else ():
+    for doubt in (*doubts, *curve.doubt_points(solved, found)) if slab.root else ():
         warn(doubt)
     return _curve(wanted.points, points, tuple(failures))
 

@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..files import checkpoint, recorder, restart, run, wisdom
 from ..files.checkpoint import Contents, Facts, TableMark
 from ..files.fields import UNITS
-from ..files.run import Options
+from ..files.stopping import Options
 from ..job import Job
 from ..job.listing import plain_job
 from ..job.yaml_text import parse

@@ -33,10 +33,10 @@ from pathlib import Path
 from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
-from ..errors import InputError
+from ..errors import FAILED, STOPPED_EARLY, InputError
 from ..files import files, run, sweep, sweep_warnings, tables
 from ..files.directory import Directory
-from ..files.run import STOPPED_EARLY, Options
+from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
 from ..job.advice import one_cell
 from ..job.listing import plain_job
@@ -384,7 +384,7 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     return [*lines, f"the error of the reference, to which they are compared, {known}"]
 
 
-ENDS = {STOPPED_EARLY: "stopped early; run again to go on", sweep.FAILED: "some cases failed: there is no limit"}
+ENDS = {STOPPED_EARLY: "stopped early; run again to go on", FAILED: "some cases failed: there is no limit"}
 Errors = Mapping[Settings, Mapping[str, float]]
 
 

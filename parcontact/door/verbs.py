@@ -13,13 +13,14 @@ import sys
 from functools import partial, wraps
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import BAD_INPUT, DONE, FAILED, InputError
 from ..parallel.root import on_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from ..doubts import Doubt
+    from ..files.stopping import Options
     from ..job import Case, Job
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
@@ -117,14 +118,13 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
 
     Cases that run at the same time print only their beginning and end.
     """
-    from ..files.recorder import always
+    from ..files.stopping import always
     from ..parallel.slab import Slab
 
     cases, chosen = on_root(world, lambda: cases_of(options))
     if not cases[0].settings:
         return act(options, cases[0].job, Slab(world, *cases[0].job.grid.points), always)
-    from ..files import run as files_run
-    from ..files import sweep, sweep_warnings
+    from ..files import stopping, sweep, sweep_warnings
     from ..parallel.tally import Groups
     from .memory import count_side_by_side
 
@@ -132,7 +132,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     shown = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
     afresh = getattr(options, "restart", "") == "never" or not runs
     groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
-    limit = files_run.limit_time(getattr(options, "wall", None))
+    limit = stopping.limit_time(getattr(options, "wall", None))
     own = argparse.Namespace(**vars(options))
     stop = on_root(world, lambda: sweep.stop_file(cases))
     own.quiet, own.sweep_stop_file = options.quiet or groups.count > 1, stop
@@ -163,29 +163,29 @@ def job_overrides(options: argparse.Namespace) -> list[str]:
     return [*options.set, *curve, *([f'output.directory="{name}"'] if options.out is not None else [])]
 
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has a fourth: stopped early, run again
-
-
 def run(options: argparse.Namespace) -> int:
     """Run a job, or continue it (the default verb)."""
     return each_case(options, start_ranks(), _run)
 
 
 def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from ..files import run as files_run
-    from ..files.run import Options
-
     if not job.history:
         return _curve(options, job, slab, shows)
-    sweep_stop_file = getattr(options, "sweep_stop_file", None)
-    chosen = Options(
-        options.quiet, options.restart, options.until, options.wall, sweep_stop_file=sweep_stop_file, shows=shows
-    )
     if job.bands is not None:
         from ..files.road_run import run_history
 
-        return run_history(job, slab, chosen)
-    return files_run.run_job(job, slab, chosen)
+        return run_history(job, slab, _of_a_run(options, shows))
+    from ..files import run as files_run
+
+    return files_run.run_job(job, slab, _of_a_run(options, shows))
+
+
+def _of_a_run(options: argparse.Namespace, shows: Shows) -> Options:
+    """Return the options of a run or a friction curve."""
+    from ..files.stopping import Options
+
+    names = ("quiet", "restart", "until", "wall", "sweep_stop_file")
+    return Options(**{name: getattr(options, name) for name in names if hasattr(options, name)}, shows=shows)
 
 
 def steady(options: argparse.Namespace) -> int:
@@ -195,7 +195,6 @@ def steady(options: argparse.Namespace) -> int:
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..bands.road_sliding import make_states
-    from ..files import run as files_run
     from ..march import curve
     from ..results import prediction
 
@@ -203,11 +202,8 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: auto or never was expected for a friction curve, got {options.restart}")
-    sweep_stop_file = getattr(options, "sweep_stop_file", None)
-    end = files_run.limit_time(getattr(options, "wall", None))
-    limit = None if end is None else end - files_run.RESERVE_SECONDS
-    chosen = (options.quiet, options.restart, shows, sweep_stop_file, make_states, limit)
-    return curve.run_curve(job, slab, wanted, *chosen, lambda: prediction.draw_curve(job, wanted))
+    draw = partial(prediction.draw_curve, job, wanted)
+    return curve.run_curve(job, slab, wanted, _of_a_run(options, shows), make_states, draw)
 
 
 @root_alone
@@ -289,9 +285,9 @@ def _describe_waves(job: Job) -> list[str]:
 
 def plan(options: argparse.Namespace) -> int:
     """Estimate the steps, time, memory and disk of a job; writes nothing."""
-    from ..files import run as files_run
+    from ..files import stopping
 
-    started = files_run.age()
+    started = stopping.age()
     world = start_ranks()
     from itertools import chain
 

@@ -23,7 +23,7 @@ from .tables import SCENE, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
 LOCK = ".lock"
-PERMITTED = (tables.NAME, *outputs.THEORY.written)  # may be there before the first run
+PERMITTED = (outputs.STOP, *outputs.THEORY.written)  # may be there before the first run
 SHOWN_NAMES = 4  # tuning: most names of files in a message
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start from the beginning, or --out for another directory"
@@ -44,7 +44,7 @@ class Directory:
 
     @property
     def stop_file(self) -> Path:
-        return self.path / tables.NAME
+        return self.path / outputs.STOP
 
     @property
     def claim(self) -> Claim | None:

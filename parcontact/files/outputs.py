@@ -34,6 +34,7 @@ class Outputs:
         return self.copies[-1]
 
 
+STOP = "stop"  # name of the stop file of a run or a sweep
 MARCHES = "checkpoint/marches.json"  # finished marches of bands
 BANDS, WAVES = "bands.csv", "steady_waves.csv"
 STEADY_THEORY, BANDS_THEORY = "steady_theory.csv", "bands_theory.csv"

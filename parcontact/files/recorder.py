@@ -22,7 +22,6 @@ from tqdm import tqdm
 
 from ..column import Column
 from ..columns import MEASURES, cells, choose_columns, names_of, values_of
-from ..doubts import Doubt
 from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget
 from ..parallel.slab import Array
@@ -178,11 +177,6 @@ def meshes_of(log: Path) -> list[str]:
 def log_lines(log: Path) -> list[str]:
     """Return the lines of a log without time stamps; none without a log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
-
-
-def always(doubt: Doubt) -> bool:
-    """Return True: all warnings are shown."""
-    return True
 
 
 class Console:

@@ -14,18 +14,18 @@ import numpy as np
 
 from ..bands.road_history import RoadHistory, RungTask
 from ..columns import BANDS_OVER_TIME, added_by, names_of, to_csv
-from ..errors import InputError
+from ..errors import DONE, STOPPED_EARLY, InputError
 from ..job import Job, listing
 from ..job.history import reached
 from ..march.budget import SHOWN
-from ..parallel.root import Signals, on_root
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..streams import Bar
-from . import files, hdf5, outputs, provenance, recorder, run, tables
+from . import files, hdf5, outputs, provenance, recorder, tables
 from .directory import ADVICE, Directory
 from .recorder import HEAD, Console, StepRow, step_line
 from .restart import SAME
-from .run import DONE, STOPPED_EARLY, Options, Watch
+from .stopping import Options, watching
 from .tables import Claim
 
 RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
@@ -139,11 +139,8 @@ class _Run:
         for text in self.road.notes():
             self._say(text)
         self.road.keep_in(self.directory.path)
-        limit = run.limit_time(self.options.wall) if self.slab.root else None
         try:
-            with Signals().noted() as signals:
-                rules = self.job.checkpoint, self.directory.stop_file, signals, limit, self.options.sweep_stop_file
-                self.watch = Watch(self.slab, *rules)
+            with watching(self.directory, self.job.checkpoint, self.options) as self.watch:
                 self.road.march(self._after)
         except _StopError as why:
             text = f"stopped after {self._made} of {self._ends[-1]} marches: {why}; run again to go on"

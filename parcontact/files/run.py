@@ -1,28 +1,16 @@
-"""A run from its start or checkpoint to its end.
-
-Reasons to stop a run early or to save: signals, a stop file, limits of wall time.
-
-Any rank may receive a signal; root knows the rest. One small message per step makes the decision common.
-
-A run: a march through a timeline with records, checkpoints and early stops.
-
-Runs of a job in its output directory, from the start or from a checkpoint.
-"""
+"""Runs of a job in its output directory, from the start or from a checkpoint: a march through a timeline with records,
+checkpoints and early stops."""
 
 import math
-import os
 import time
-from collections import deque
-from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..doubts import Doubt
 from ..effects.effect import Detached, columns_of
-from ..errors import InputError, RunError
-from ..job import Checkpoint, Job, Rough, RoughSpectrum, listing
+from ..errors import DONE, STOPPED_EARLY, InputError, RunError
+from ..job import Job, Rough, RoughSpectrum, listing
 from ..job.advice import describe_sample
 from ..job.history import ChosenSteps, Timeline, reached
 from ..job.listing import answers, plain_data
@@ -30,7 +18,7 @@ from ..march import loop, sanity, scene, steady
 from ..march.choices import choices
 from ..march.laws import StepError
 from ..march.loop import March
-from ..parallel.root import Signals, on_root
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.body import states_errors
 from ..physics.entries import Saved, part_of
@@ -41,137 +29,10 @@ from . import checkpoint, hdf5, outputs, provenance, recorder, restart, tables, 
 from .checkpoint import Contents, Facts
 from .directory import Directory
 from .provenance import Link, Provenance, cite_lines, extend_chain
-from .recorder import Recorder, Recording, StepRow, always
+from .recorder import Recorder, Recording, StepRow
 from .restart import RestartPoint
-from .tables import Claim, StopFile
-
-LOOK_SECONDS = 0.2  # tuning: least time between checks for the stop file [s]
-RESERVE_SECONDS = 5.0  # tuning: wall time reserved for the end of MPI and of files [s]
-FIRST_WRITE = 50e6  # tuning: expected writing rate of the first checkpoint [bytes/s]
-RECENT = 50  # tuning: number of recent steps, the longest of which is expected for the next one
-
-GO, WALL, FILE, SIGNAL = range(4)  # the largest reason on any rank decides
-REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was found", SIGNAL: "a signal was received"}
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Common decision after a step: why the run stops early (`stop`) or fails (`problem`), or ''."""
-
-    stop: str = ""
-    save: bool = False
-    problem: str = ""
-
-
-@dataclass
-class Watch:
-    """Decides after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
-    `sweep_stop_file` is shared by all cases of a sweep; it is not removed."""
-
-    slab: Slab
-    rules: Checkpoint
-    stop_file: Path
-    signals: Signals
-    limit: float | None = None
-    sweep_stop_file: StopFile | None = None
-    state_bytes: int = 0
-    _saved: float = field(default_factory=time.monotonic)
-    _looked: float = 0.0
-    _made: int = 0
-    _last: float = field(default_factory=time.monotonic)  # or the first step would be as long as the machine is up
-    _write: float = -1.0
-    _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
-
-    def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """Return whether the run stops or saves after a step; collective. `began`: this run has made a step.
-        `problem`: a failure on root."""
-        now = time.monotonic()
-        if began:
-            self._steps.append(now - self._last)
-        self._last = now
-        codes = [SIGNAL * self.signals.stop, self.signals.save, 0]
-        self.signals.save = False
-        if self.slab.root:
-            codes = [max(codes[0], self._stop(now, began)), codes[1] or self._due(step, now, began), bool(problem)]
-        self._made = step
-        stop, save, failed = self.slab.reduce((), codes)
-        if failed:
-            return Verdict(problem=self.slab.agree(problem))
-        if stop == FILE and (problem := self.slab.agree(tables.remove(self.stop_file) if self.slab.root else "")):
-            return Verdict(problem=problem)
-        return Verdict(REASONS.get(int(stop), ""), bool(save))
-
-    def saved(self, seconds: float) -> None:
-        """Record that a checkpoint was written in `seconds` [s]."""
-        self._write = seconds
-        self._saved = self._last = time.monotonic()
-
-    def _stop(self, now: float, began: bool) -> int:
-        if began and self.limit is not None and now + self.reserve > self.limit:
-            return WALL
-        if now - self._looked > LOOK_SECONDS:
-            self._looked = now
-            asked = os.path.lexists(self.stop_file) or (self.sweep_stop_file is not None and self.sweep_stop_file.asks)
-            return FILE if asked else GO
-        return GO
-
-    def _due(self, step: int, now: float, began: bool) -> bool:
-        if not began:
-            return False
-        if self.rules.every is not None:
-            return step // self.rules.every > self._made // self.rules.every  # a multiple may be skipped
-        return self.rules.minutes is not None and now - self._saved >= 60.0 * self.rules.minutes
-
-    @property
-    def reserve(self) -> float:
-        """Return the wall time [s] for one more step and a checkpoint, each twice as long as seen so far."""
-        write = self._write if self._write >= 0.0 else self.state_bytes / FIRST_WRITE
-        return RESERVE_SECONDS + 2.0 * (max(self._steps, default=0.0) + write)
-
-
-def limit_time(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
-    """Return the time (of `time.monotonic`) by which a run must end: after `wall` seconds, or with its batch job.
-
-    The end of a batch job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME [s since 1970], or PBS_WALLTIME after the start
-    of this program, slightly too late. An end before that start belongs to another job and is ignored. The clock is
-    read once, as it may be changed later.
-    """
-    now = time.monotonic()
-    born, epoch = now - age(), now - time.time()
-    limits = [] if wall is None else [born + wall]
-    for name, start in (("PARCONTACT_END_TIME", epoch), ("SLURM_JOB_END_TIME", epoch), ("PBS_WALLTIME", born)):
-        with suppress(KeyError, ValueError):
-            end = start + float(environment[name])
-            limits += [end] if end > born else []
-    return min(limits, default=None)
-
-
-def age() -> float:
-    """Return the age of this process [s]."""
-    try:
-        ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
-        return max(time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK"), 0.0)
-    except (OSError, ValueError, IndexError):
-        return 0.0
-
-
-DONE, STOPPED_EARLY = 0, 3  # exit codes: success; stopped early with a good checkpoint, run again
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options of a run: `restart`, `until` [s of the history], `wall` [s since the start of the program].
-
-    `sweep_stop_file` is a stop file shared by all cases of a sweep; it is not removed. Warnings for which `shows` is
-    False go into run.log only.
-    """
-
-    quiet: bool = False
-    restart: str = "auto"
-    until: float | None = None
-    wall: float | None = None
-    sweep_stop_file: StopFile | None = None
-    shows: Callable[[Doubt], bool] = always
+from .stopping import Options, Watch, watching
+from .tables import Claim
 
 
 class Run:
@@ -441,11 +302,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 recorder.console.warn(str(doubt), shown=options.shows(doubt))
             for text in (*warnings, *recorder.warnings):
                 recorder.console.warn(text)
-            limit = limit_time(options.wall) if slab.root else None
-            with Signals().noted() as signals:
-                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit, options.sweep_stop_file)
-                code = Run(march, directory, recorder, watching, facts, options).go(saved)
-                return Ended(code, march)
+            with watching(directory, job.checkpoint, options) as watch:
+                return Ended(Run(march, directory, recorder, watch, facts, options).go(saved), march)
         finally:
             recorder.close()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..doubts import Doubt
-from ..errors import InputError, InUseError, RunError
+from ..errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, InputError, InUseError, RunError
 from ..job import Case, Job
 from ..job.listing import plain_job
 from ..job.reading import CASES
@@ -20,15 +20,13 @@ from ..parallel.tally import Groups
 from ..printed import name_cases, per_cent
 from ..results import sweep_table
 from ..results.results import Results
-from . import files, outputs, run, tables
+from . import files, outputs, stopping, tables
 from .directory import refuse_files, refuse_other_jobs
-from .run import DONE, STOPPED_EARLY
+from .stopping import StopFile
 from .sweep_warnings import SweepWarnings
-from .tables import StopFile
 
-FAILED, REFUSED = 1, 2
 ELSEWHERE = -1  # in place of an exit code: another program runs the case
-ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", REFUSED: "refused", ELSEWHERE: "passed over"}
+ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", BAD_INPUT: "refused", ELSEWHERE: "passed over"}
 
 Shows = Callable[[Doubt], bool]
 Act = Callable[[Job, Slab, Shows], int]
@@ -70,7 +68,7 @@ class SweepRun:
             ends = self._take(_deal(chosen, self.groups), signals)
             found = self.groups.from_all((ends, self.doubts.kinds))
         codes = [code for ends, _ in found for code in ends]
-        refused = set(codes) == {REFUSED}
+        refused = set(codes) == {BAD_INPUT}
         if self.groups.root:
             self.stop.forget_own()
             for text in self.doubts.summary([kinds for _, kinds in found]):
@@ -83,7 +81,7 @@ class SweepRun:
                 self._report_errors(chosen)
         if STOPPED_EARLY in codes:
             return STOPPED_EARLY
-        return REFUSED if refused else FAILED if {FAILED, REFUSED} & set(codes) else DONE
+        return BAD_INPUT if refused else FAILED if {FAILED, BAD_INPUT} & set(codes) else DONE
 
     def _report_errors(self, chosen: Sequence[Case]) -> None:
         """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy; root only."""
@@ -114,7 +112,7 @@ class SweepRun:
                 print_line(f"{case} (of {len(self.cases)})")
             ended = self._attempt(case, slab, alone=not side_by_side and len(own) == 1)
             codes.append(ended)
-            if slab.root and (self.runs or ended != REFUSED) and self._collect() == FAILED:
+            if slab.root and (self.runs or ended != BAD_INPUT) and self._collect() == FAILED:
                 codes.append(FAILED)
             if speaks and side_by_side:
                 print_line(f"case {case.number}: {ENDS[ended]}")
@@ -138,10 +136,10 @@ class SweepRun:
     def _reason_to_stop(self, slab: Slab, signals: Signals) -> str:
         """Return why no further case begins, or ''; signals may reach any rank; collective."""
         if slab.reduce((), [float(signals.stop)])[0]:
-            return run.REASONS[run.SIGNAL]
-        used_up = self.limit is not None and time.monotonic() + run.RESERVE_SECONDS > self.limit
-        why = run.WALL if used_up else run.FILE if self.stop.asks else run.GO
-        return run.REASONS.get(slab.agree(why), "")
+            return stopping.REASONS[stopping.SIGNAL]
+        used_up = self.limit is not None and time.monotonic() + stopping.RESERVE_SECONDS > self.limit
+        why = stopping.WALL if used_up else stopping.FILE if self.stop.asks else stopping.GO
+        return stopping.REASONS.get(slab.agree(why), "")
 
     def _stop_others(self, slab: Slab) -> int:
         if slab.root and self.groups.count > 1:
@@ -161,7 +159,7 @@ class SweepRun:
                 print_line(f"parcontact: case {case.number} is being run by another program: {error}", sys.stderr)
             return ELSEWHERE
         except (InputError, RunError) as error:
-            code, reason = REFUSED if isinstance(error, InputError) else FAILED, str(error)
+            code, reason = BAD_INPUT if isinstance(error, InputError) else FAILED, str(error)
         if slab.root and self.runs:
             sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
         if slab.root and reason:
@@ -216,7 +214,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
 
 def stop_file(cases: Sequence[Case]) -> StopFile:
     """Return the stop file of a sweep."""
-    return StopFile.from_now_on(_directory(cases) / tables.NAME)
+    return StopFile.from_now_on(_directory(cases) / outputs.STOP)
 
 
 def _directory(cases: Sequence[Case]) -> Path:

@@ -5,8 +5,6 @@ a picture.
 """
 
 import math
-import os
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,19 +13,20 @@ from typing import Any, NamedTuple, Protocol
 from .. import streams
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..doubts import Doubt, Kind
-from ..errors import InputError, RunError, UnsolvedError
+from ..errors import DONE, FAILED, STOPPED_EARLY, InputError, RunError, UnsolvedError
 from ..files import files, hdf5, outputs, tables, wisdom
 from ..files.directory import ADVICE, Directory
 from ..files.fields import SteadyMaps
 from ..files.provenance import Link, Provenance, cite_lines
-from ..files.recorder import Console, always
-from ..files.tables import GrowingTable, LostPoint, StopFile, Wanted
+from ..files.recorder import Console
+from ..files.stopping import Options, Watch, always, watching
+from ..files.tables import GrowingTable, LostPoint, Wanted
 from ..job import Job, listing
 from ..job.advice import describe_sample, more_points
 from ..job.history import Timeline
 from ..job.listing import answers
 from ..job.materials import describe_temperature
-from ..parallel.root import Signals, on_root
+from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..printed import per_cent
 from . import choices, sanity, scene
@@ -161,9 +160,7 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        found = [asked(self._points, self._job) for asked in answers("steady", "doubts_of_points")]
-        of_points = [doubt for doubts in found for doubt in doubts]
-        for warning in (*of_points, *describe_missed(self._points, self._job, self._earlier())):
+        for warning in doubt_points(self._points, self._job, self._earlier()):
             self._console.warn(str(warning))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
@@ -204,6 +201,13 @@ class CurveTable:
 WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {where}")
 
 
+def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
+    """Yield warnings about the solved points of a curve, of effects and of `describe_missed`."""
+    for asked in answers("steady", "doubts_of_points"):
+        yield from asked(points, job)
+    yield from describe_missed(points, job, earlier)
+
+
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
     """Yield warnings about points whose error of friction or of the corrected area exceeds the accuracy of the job.
 
@@ -236,7 +240,6 @@ def _percent(share: float) -> str:
     return "     -" if math.isnan(share) else "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"
 
 
-DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
 SAME = (*tables.SCENE, *tables.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
 
 
@@ -326,6 +329,19 @@ def on_one_grid(job: Job, slab: Slab) -> States:
     return SteadySliding(scene.set_up(job, slab))
 
 
+def watch_contacts(setup: Setup) -> sanity.ContactWatch:
+    """Return the checks of the contacts of a curve, each of which gives each kind of warning once."""
+    chosen = setup.choices
+    return sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
+
+
+def solve_point(sliding: States, wanted: Request, at: Wanted) -> Point:
+    """Return the steady state at one of the `wanted` points; collective. Raises RunError."""
+    if wanted.temperatures:
+        sliding.set_temperature(at.temperature)
+    return sliding.solve(wanted.velocity(at.speed), at.pressure)
+
+
 def transforms_of(job: Job) -> list[Any]:
     """Return facts that, with the number of ranks, determine the transforms of a curve; a restart compares them."""
     return [*choices.choices(job).transforms, "curve"]
@@ -335,27 +351,21 @@ def run_curve(
     job: Job,
     slab: Slab,
     wanted: Request,
-    quiet: bool,
-    restart: str = "auto",
-    shows: Callable[[Doubt], bool] = always,
-    sweep_stop_file: StopFile | None = None,
+    options: Options,
     make: Callable[[Job, Slab], States] = on_one_grid,
-    limit: float | None = None,
     draw: Draw | None = None,
 ) -> int:
     """Solve all missing points of a friction curve, and write each at once; collective. Return the exit code.
 
-    If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings are
-    printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed. `make`
-    makes the solver of the states; `draw` draws the finished curve, on root. The last point must be solved by the time
-    `limit` (of `time.monotonic`), if given.
+    If a point fails, the others are still solved, and the exit code is 1. `restart` of the options is `auto` or
+    `never`. `make` makes the solver of the states; `draw` draws the finished curve, on root.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
         sanity.refuse_impossible(job, Timeline.from_job(job))
         plain = _identity(job, wanted) if slab.root else {}
-        directory.refuse_foreign(job.path, plain, restart == "never")
-        goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
+        directory.refuse_foreign(job.path, plain, options.restart == "never")
+        goes_on = options.restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
         transforms = transforms_of(job)
         wisdom.recall(transforms, slab, None)
         sliding = make(job, slab)
@@ -364,16 +374,16 @@ def run_curve(
         directory.make(job.path, job.resolved(), tables.Claim(plain))
         if not goes_on:
             directory.clear()
-        table = _table(directory.path, sliding, wanted, quiet)
+        table = _table(directory.path, sliding, wanted, options.quiet)
         if table:
             for text in sliding.notes():
                 table.say(text)
-            table.warn(doubts, shows)
+            table.warn(doubts, options.shows)
         maps = _maps(job, slab, wanted, directory)
         sliding.keep_in(directory.path)
         try:
-            with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file, limit).go(draw)
+            with watching(directory, job.checkpoint, options) as watch:
+                return _Curve(sliding, wanted, table, maps, directory, watch, options.shows).go(draw)
         finally:
             if table:
                 table.close()
@@ -423,46 +433,31 @@ class _Curve:
     table: CurveTable | None
     maps: SteadyMaps | None
     directory: Directory
-    signals: Signals
+    watch: Watch
     shows: Callable[[Doubt], bool]
-    sweep_stop_file: StopFile | None
-    limit: float | None
     failures: int = 0
-    longest: float = -math.inf
 
     def __post_init__(self) -> None:
-        chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
-        self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
+        self.slab, self.contacts = self.sliding.setup.slab, watch_contacts(self.sliding.setup)
 
     def go(self, draw: Draw | None) -> int:
         """Solve the missing points of the curve; collective. Return the exit code."""
         bare = self.maps.lacking if self.maps else []
         lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
         for count, index in enumerate(lacking):
-            if self._stopped():
+            verdict = self.watch.decide(count, count > 0)
+            if verdict.problem:
+                raise RunError(verdict.problem)
+            if verdict.stop:
                 self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")
-                return AGAIN
-            began = time.monotonic()
+                return STOPPED_EARLY
             self._solve(index)
-            self.longest = max(self.longest, time.monotonic() - began)
             if self.table:
                 self.table.pass_on()
         on_root(self.slab.comm, lambda: self.table.conclude(self.failures, draw) if self.table else None)
         if self.table:
             self.directory.note(finished=(self.table.count, 0.0))
         return FAILED if self.failures else DONE
-
-    def _stopped(self) -> bool:
-        """Return whether a stop was requested, or a point that takes twice the longest time so far would come too late;
-        its own stop file is then removed."""
-        late = self.limit is not None and time.monotonic() + 2.0 * self.longest > self.limit
-        others = late or (self.sweep_stop_file is not None and self.sweep_stop_file.asks)
-        asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
-        if not self.slab.reduce((), [float(asked)])[0]:
-            return False
-        if problem := self.slab.agree(tables.remove(self.directory.stop_file) if self.slab.root else ""):
-            raise RunError(problem)
-        return True
 
     def _say(self, text: str) -> None:
         if self.table:
@@ -480,22 +475,19 @@ class _Curve:
     def _solve(self, index: int) -> None:
         """Solve and write a point; a failure is reported."""
         wanted, table = self.wanted.points[index], self.table
-        velocity = self.wanted.velocity(wanted.speed)
         try:
-            if not math.isnan(wanted.temperature):
-                self.sliding.set_temperature(wanted.temperature)
-            point = self.sliding.solve(velocity, wanted.pressure)
+            point = solve_point(self.sliding, self.wanted, wanted)
         except RunError as error:
             self._lose(wanted, error)
             return
-        rows = self.sliding.rows(velocity) if self.wanted.waves or self.sliding.table else []
+        rows = self.sliding.rows(self.wanted.velocity(wanted.speed)) if self.wanted.waves or self.sliding.table else []
         if self.maps:
             self.maps.save(index, {name: self.sliding.field(name) for name in self.maps.names})
 
         def write() -> None:
             if table:
                 table.write(point, rows)
-                table.warn(self.watch.check_point(point.measures, str(wanted)), self.shows)
+                table.warn(self.contacts.check_point(point.measures, str(wanted)), self.shows)
 
         hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / outputs.STEADY.table}")
         self.sliding.forget()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from .. import printed
 from ..columns import UNITS
 from ..errors import InputError
+from ..files import outputs
 from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
@@ -122,10 +123,9 @@ def _steps_grow(times: Array) -> bool:
 def _add_theory(panel: Panel, run: PlottedRun) -> Panel:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
     column = {"friction": "friction", "area": "contact_area"}.get(panel.key)
-    table = run.path / "theory.csv"
-    if column is None or run.backwards or not table.is_file():
+    if column is None or run.backwards or not run.has(outputs.THEORY.table):
         return panel
-    theory = run.read(table.name).arrays()
+    theory = run.read(outputs.THEORY.table).arrays()
     over = "distance" if panel.x.unit == "m" else "time"
     (own,) = panel.series
     lines = [replace(own, name="simulation"), Line("theory", theory[over], theory[column], style.line(1))]

@@ -19,7 +19,7 @@ from short_job import JOB, STEPS
 
 from parcontact import __main__
 from parcontact.door.arguments import NAMES, wall_seconds
-from parcontact.files import run
+from parcontact.files import stopping
 
 
 def job(path: Path, **changes: Any) -> Path:
@@ -162,25 +162,25 @@ def test_wall_times(text: str, seconds: float) -> None:
 def test_end_of_a_batch_job() -> None:
     """The earliest limit holds; times are those of the batch system or of this process's start, kept by a clock that
     nobody sets."""
-    assert run.limit_time(None, {}) is None
-    born = run.limit_time(0.0, {})
+    assert stopping.limit_time(None, {}) is None
+    born = stopping.limit_time(0.0, {})
     assert born is not None
     assert 0.0 < time.monotonic() - born < 3600.0
     epoch = born + time.time() - time.monotonic()
     soon, late = repr(epoch + 100.0), repr(epoch + 200.0)
     near = partial(pytest.approx, abs=0.1)
-    assert run.limit_time(300.0, {"SLURM_JOB_END_TIME": late}) == near(born + 200.0)
-    assert run.limit_time(None, {"PARCONTACT_END_TIME": soon, "SLURM_JOB_END_TIME": late}) == near(born + 100.0)
-    assert run.limit_time(None, {"SLURM_JOB_END_TIME": repr(epoch - 1.0)}) is None  # of an earlier job
-    assert run.limit_time(None, {"PBS_WALLTIME": "60"}) == near(born + 60.0)
-    assert run.limit_time(50.0, {"PBS_WALLTIME": "60"}) == near(born + 50.0)
+    assert stopping.limit_time(300.0, {"SLURM_JOB_END_TIME": late}) == near(born + 200.0)
+    assert stopping.limit_time(None, {"PARCONTACT_END_TIME": soon, "SLURM_JOB_END_TIME": late}) == near(born + 100.0)
+    assert stopping.limit_time(None, {"SLURM_JOB_END_TIME": repr(epoch - 1.0)}) is None  # of an earlier job
+    assert stopping.limit_time(None, {"PBS_WALLTIME": "60"}) == near(born + 60.0)
+    assert stopping.limit_time(50.0, {"PBS_WALLTIME": "60"}) == near(born + 50.0)
 
 
 def test_limit_of_a_clock_that_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
     """The wall time goes on as it did when somebody sets the clock of the day a year ahead."""
-    before = run.limit_time(60.0, {})
+    before = stopping.limit_time(60.0, {})
     monkeypatch.setattr(time, "time", lambda: 1e10)
-    assert run.limit_time(60.0, {}) == pytest.approx(before, abs=0.1)
+    assert stopping.limit_time(60.0, {}) == pytest.approx(before, abs=0.1)
 
 
 def test_info_and_check(main: Main, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_check_reads_a_measured_road(main: Main, tmp_path: Path) -> None:
 def test_help_is_a_verb(main: Main) -> None:
     assert main("help") == main("--help")
     assert main("help", "plan") == main("plan", "--help")
-    assert f"{run.RESERVE_SECONDS:g} s and twice the longest step" in " ".join(main("help", "run")[1].split())
+    assert f"{stopping.RESERVE_SECONDS:g} s and twice the longest step" in " ".join(main("help", "run")[1].split())
 
 
 def test_options_may_come_first(main: Main, tmp_path: Path) -> None:

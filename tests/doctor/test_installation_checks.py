@@ -15,7 +15,7 @@ from parcontact.door.doctor import CHECKS, Bench, Check, Finding, markdown, run_
 from parcontact.door.manual import texts
 from parcontact.errors import RunError
 from parcontact.files import run as runner
-from parcontact.files.run import Options
+from parcontact.files.stopping import Options
 
 
 def test_a_case_that_goes_wrong_is_seen() -> None:

@@ -10,7 +10,7 @@ from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
 
 from parcontact.files import run as runner
 from parcontact.files import tables
-from parcontact.files.run import Options
+from parcontact.files.stopping import Options
 from parcontact.job.parts import Origin
 from parcontact.parallel.slab import Slab
 

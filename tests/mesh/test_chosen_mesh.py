@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.files import run
-from parcontact.files.run import Options, chosen_by_accuracy
+from parcontact.files.run import chosen_by_accuracy
+from parcontact.files.stopping import Options
 from parcontact.job import Job
 from parcontact.job.advice import Guess
 from parcontact.job.surfaces import Rough
@@ -95,7 +96,7 @@ def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path:
     job = on_root(comm, lambda: load(path, [f"output.directory={shared_path / 'out'}"]))
     slab = Slab(comm, *job.grid.points)
     assert run.run_job(job, slab, Options(quiet=True)) == 0
-    assert curve.run_curve(job, slab, curve.request(job), quiet=True) == 0
+    assert curve.run_curve(job, slab, curve.request(job), Options(quiet=True)) == 0
     if comm.rank == 0:
         said, sound = info.describe_path(shared_path / "out")
         assert sound

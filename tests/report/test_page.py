@@ -16,6 +16,7 @@ from PIL import Image
 
 from parcontact import __main__, job
 from parcontact.errors import InputError
+from parcontact.files.stopping import Options
 from parcontact.march import curve
 from parcontact.parallel.slab import Slab
 from parcontact.results import page
@@ -110,7 +111,7 @@ def solved(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
-    assert curve.run_curve(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), quiet=True) == 0
+    assert curve.run_curve(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), Options(quiet=True)) == 0
     return tmp_path / "steady"
 
 

@@ -32,7 +32,7 @@ from parcontact.door.study import (
 from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.errors import InputError
 from parcontact.files import run as runner
-from parcontact.files.run import Options
+from parcontact.files.stopping import Options
 from parcontact.job import Job, load
 from parcontact.job.history import Timeline
 from parcontact.march.mesh import load as load_job

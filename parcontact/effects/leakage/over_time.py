@@ -234,9 +234,8 @@ class Gaps:
                 "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
             )
             raise InputError(f"{directory} is no {what}")
-        self.directory, self.results = directory, Results(directory, "run", shown_job(directory / outputs.RUN.resolved))
-        self.job = shown_job(directory / outputs.RUN.resolved)
-        job = self.job
+        job = self.job = shown_job(directory / outputs.RUN.resolved)
+        self.directory, self.results = directory, Results(directory, "run", job)
         self.size, self.periodic = job.grid.size, job.grid.cyclic
         self.cells = job.grid.nx * job.grid.ny
         self.columns = self.results.table
