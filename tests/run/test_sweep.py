@@ -21,7 +21,7 @@ from sweeping import JOB, table
 from parcontact.__main__ import main
 from parcontact.door import memory
 from parcontact.errors import InputError, RunError
-from parcontact.files import directory, files, run, stopping, sweep, tables
+from parcontact.files import directory, files, stopping, sweep, tables
 from parcontact.files.stopping import StopFile
 from parcontact.job import Case, Job, load_cases
 from parcontact.march.sanity import WARN_CELLS, WARN_EDGE
