@@ -118,15 +118,24 @@ def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest
     return run
 
 
+@pytest.fixture
+def drawn() -> "list[Figure]":
+    """The figures that have been saved, laid out."""
+    return []
+
+
 @pytest.fixture(autouse=True)
-def drawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
-    """The figures that have been saved: files with nothing on them, unless a test is marked `rendered`."""
-    figures: list[Any] = []
-    if "matplotlib" not in sys.modules and not {"main", "drawn"} & set(request.fixturenames):
-        return figures  # nor is it imported for a test that draws nothing
+def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Save files of pictures with nothing on them, unless a test is marked `rendered`; lay figures out only for tests
+    that look at them: these are marked, or ask for `drawn`, or watch pictures."""
+    looked_at, rendered = "drawn" in request.fixturenames, request.node.get_closest_marker("rendered")
+    if "matplotlib" not in sys.modules and not looked_at and "main" not in request.fixturenames:
+        return  # it is not imported for a test that draws nothing
     from matplotlib.figure import Figure
 
-    draw, rendered = Figure.savefig, request.node.get_closest_marker("rendered")
+    from parcontact.results import style
+
+    draw, figures = Figure.savefig, request.getfixturevalue("drawn") if looked_at else list[Any]()
 
     def save(figure: Figure, file: Any, **options: Any) -> None:
         figures.append(figure)
@@ -136,7 +145,8 @@ def drawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> "l
             draw(Figure(figsize=(0.1, 0.1)), file, **{**options, "dpi": 20})
 
     monkeypatch.setattr(Figure, "savefig", save)
-    return figures
+    if not looked_at and not rendered:
+        monkeypatch.setattr(style, "arrange", lambda figure: None)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -16,8 +16,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
+from parcontact.results import style
+
 NARROWEST, LOWEST = 1 / 8, 1 / 12  # least width and height of axes over those of the figure
 MOST_INSIDE = 8  # most entries of a legend within its axes
+ARRANGE = style.arrange  # which other tests leave out
 
 
 def assert_legible(figure: Figure) -> None:
@@ -41,6 +44,7 @@ def watch_pictures() -> Iterator[list[Figure]]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Saved, "savefig", judge)
+        patch.setattr(style, "arrange", ARRANGE)
         yield figures
     for number, figure in enumerate(figures, 1):
         if figure.stale:  # has changed since it was saved: its last frame
