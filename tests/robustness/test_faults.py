@@ -17,6 +17,7 @@ import short_job
 import yaml
 from conftest import WORLD, outside
 from csv_rows import measures
+from marched_jobs import ROOT
 
 from parcontact import __main__
 from parcontact.errors import RunError
@@ -122,8 +123,9 @@ def same(out: Path, whole: Path) -> None:
     assert not list(out.glob("checkpoint/*.part"))
 
 
-def test_asked_to_stop(runs: Runs, whole: Path, tmp_path: Path) -> None:
-    """By a signal to one rank (to mpirun: below), or by a file: it saves and says run again; in the end
+def test_stopped_and_killed(runs: Runs, whole: Path, tmp_path: Path) -> None:
+    """Asked to stop by a signal to one rank (to mpirun: below) or by a file, it saves and says run again. When one rank
+    is killed, or all and mpirun with them, the others end too, and the next run goes on where it was saved. In the end
     nothing has changed."""
     out = tmp_path / "out"
     asked: list[Callable[[subprocess.Popen[str]], None]] = [
@@ -138,13 +140,6 @@ def test_asked_to_stop(runs: Runs, whole: Path, tmp_path: Path) -> None:
         assert "Traceback" not in errors
         last = (out / "measures.csv").read_text().splitlines()[-1].split(",")[0]
         assert (out / "checkpoint" / f"step-{last}.h5").exists()
-    assert runs.finish(out) == ""
-    same(out, whole)
-
-
-def test_killed(runs: Runs, whole: Path, tmp_path: Path) -> None:
-    """One rank, then all and mpirun with them: the others end too, and the next run goes on where it was saved."""
-    out = tmp_path / "out"
     process = runs.under_way(out)
     os.kill(children(process)[1], signal.SIGKILL)
     assert ended(process)[0] not in (0, AGAIN)
@@ -193,28 +188,6 @@ def test_vanished_directory(runs: Runs, tmp_path: Path) -> None:
     assert "Traceback" not in errors
 
 
-@pytest.mark.parametrize("place", ["measures.csv", "fields.h5"])
-def test_read_only_file(runs: Runs, tmp_path: Path, place: str) -> None:
-    out = tmp_path / "out"
-    process = runs.under_way(out, ranks=1)
-    process.send_signal(signal.SIGUSR1)
-    assert ended(process)[0] == AGAIN
-    if os.geteuid() == 0:
-        if subprocess.run(["chattr", "+i", out / place], stderr=subprocess.DEVNULL).returncode:
-            pytest.skip("root may write everything here")
-    else:
-        (out / place).chmod(0o444)
-    try:
-        code, errors = ended(runs.start(out, ranks=1))
-    finally:
-        if os.geteuid() == 0:
-            subprocess.run(["chattr", "-i", out / place], check=True)
-    assert code in (1, BAD_INPUT)
-    assert len(errors.splitlines()) == 1
-    assert place in errors
-    assert "permitted" in errors or "Permission denied" in errors
-
-
 # -- what must not end a run, and what must: its console, signals, full disks; what it says of itself -----------------
 
 GUMMI: dict[str, Any] = {
@@ -244,6 +217,26 @@ def rows(out: Path) -> int:
         return (out / "measures.csv").read_bytes().count(b"\n") - 1
     except FileNotFoundError:
         return 0
+
+
+@pytest.mark.parametrize("place", ["measures.csv", "fields.h5"])
+def test_read_only_file(here: Path, capsys: pytest.CaptureFixture[str], place: str) -> None:
+    path, words = here / "out" / place, ["job.yaml", "--out", "out", "--quiet"]
+    assert __main__.main([*words, "--until", "0.0007"]) == DONE
+    if os.geteuid() == 0:
+        if subprocess.run(["chattr", "+i", path], stderr=subprocess.DEVNULL).returncode:
+            pytest.skip("root may write everything here")
+    else:
+        path.chmod(0o444)
+    try:
+        code, errors = __main__.main(words), capsys.readouterr().err
+    finally:
+        if os.geteuid() == 0:
+            subprocess.run(["chattr", "-i", path], check=True)
+    assert code in (FAILED, BAD_INPUT)
+    assert len(errors.splitlines()) == 1
+    assert place in errors
+    assert "permitted" in errors or "Permission denied" in errors
 
 
 class Broken(io.TextIOWrapper):
@@ -311,15 +304,25 @@ def newest(out: Path) -> int:
     return max((int(path.stem[5:]) for path in out.glob("checkpoint/step-*.h5")), default=-1)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_mpirun_that_is_asked_to_end(here: Path, outside_mpi: dict[str, str], number: signal.Signals) -> None:
+def test_mpirun_that_is_asked_to_end(here: Path, outside_mpi: dict[str, str]) -> None:
     """Its ranks save the last step that they have made, and it ends with 3 as they do."""
     process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
     wait_for(process, lambda: rows(here / "out") > 3)
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     process.communicate(timeout=SECONDS)
     assert process.returncode == AGAIN
     assert newest(here / "out") == rows(here / "out") - 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
+def test_signals_that_mpirun_hands_on(here: Path, number: signal.Signals) -> None:
+    """A launcher is asked by SIGUSR1, whatever signal it was."""
+    launcher = "trap 'exit 3' USR1; touch ready; while :; do sleep 0.05; done"
+    words = [sys.executable, "-I", "-S", str(ROOT / "scripts/launch.py"), "sh", "-c", launcher]
+    process = subprocess.Popen(words, start_new_session=True)
+    wait_for(process, (here / "ready").exists)
+    process.send_signal(number)
+    assert process.wait(timeout=SECONDS) == AGAIN
 
 
 def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
