@@ -16,7 +16,7 @@ from mpi4py import MPI
 from . import scenes
 from .witness import distance, trial, witness
 
-FEW = 50  # scenes of Hypothesis; each is marched twice
+FEW = 25  # scenes of Hypothesis; each is marched twice
 SEEDS = range(6)  # of scenes on many ranks
 
 
