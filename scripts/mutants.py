@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -50,11 +51,16 @@ def tests_of(part: str) -> tuple[str, ...]:
     path = Path(part)
     room = r"\.".join(path.parent.parts)
     name = re.compile(rf"from parcontact\.{room}(\.{path.stem} import| import .*\b{path.stem}\b)")
-    texts = {test: test.read_text() for test in sorted(TESTS.rglob("test_*.py"))}
+    texts = texts_of_tests()
     found = [test for test, text in texts.items() if name.search(text)]
     own = sorted(found, key=lambda test: -texts[test].count(path.stem))[:MOST_TESTS]
     own += [TESTS / name for name in OTHERS.get(part, "").split()]
     return tuple(str(path.relative_to(ROOT)) for path in own)
+
+
+@cache
+def texts_of_tests() -> dict[Path, str]:
+    return {test: test.read_text() for test in sorted(TESTS.rglob("test_*.py"))}
 
 
 def parts() -> list[str]:
