@@ -1,15 +1,14 @@
-"""Checkpoints, and what else a run keeps to start again.
+"""Checkpoints, which hold the complete state of a run at one instant, and height files that jobs need to start again.
 
-Checkpoints: the complete state of a run at one instant, in an HDF5 file with checksums.
+A checkpoint is an HDF5 file with checksums. Maps are global datasets `part/name` of shape (ny, nx), so that any number
+of ranks can read them; numbers are small datasets. Both are in the units of the run, which are powers of two:
+multiplied by the attribute `unit` they are in SI.
 
-Maps are global datasets `part/name` of shape (ny, nx), so any number of ranks can read its rows; numbers are small
-datasets. Both are in the units of the run, which are powers of two: the attribute `unit` is the SI value of 1.
+Each row of a map has its CRC-32 in the group `checksums`. All bytes outside of maps are covered by a checksum in the
+seal, a text in front of the HDF5 data (the user block of the file) that is written last. Damaged files are recognised
+before HDF5, which may crash on them, opens them. The file has a temporary name until it is complete.
 
-Each row of a map has its CRC-32 in the group `checksums`. All bytes outside of maps are covered by the checksum in the
-seal, a text in front of the HDF5 data (its user block) that is written last. Damaged files are recognised before HDF5,
-which may crash on them, opens them. The file has a temporary name until it is complete.
-
-Heights given in Python, stored as files in the directories of jobs and checkpoints.
+Heights that were given in Python are stored as files in the directories of jobs and checkpoints.
 """
 
 import json
@@ -41,7 +40,7 @@ SUMS = "checksums"
 
 @dataclass(frozen=True)
 class TableMark:
-    """State of measures.csv: its number of rows, and the last row."""
+    """State of measures.csv: number of rows, and the last row."""
 
     rows: int = 0
     last: str = ""
@@ -49,7 +48,7 @@ class TableMark:
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of a sound checkpoint: `numbers` and their `units` by name; types of maps and checksums of their
+    """Contents of an undamaged checkpoint: `numbers` and their `units` by name; types of maps, and checksums of their
     rows."""
 
     path: Path
@@ -138,7 +137,7 @@ def row_sums(rows: Array) -> NDArray[np.uint32]:
 
 
 def inspect(path: Path) -> Contents:
-    """Read everything but the maps, which `verify` checks; raises InputError for a damaged file."""
+    """Return the contents of a checkpoint without maps, which `verify` checks; raises InputError for a damaged file."""
     try:
         if problem := _broken(path):
             raise InputError(f"{path} {problem}")
@@ -224,7 +223,7 @@ def _contents(path: Path, file: h5py.File) -> Contents:
 
 
 def verify(contents: Contents, slab: Slab) -> str:
-    """Check the maps against their checksums, each rank its own rows; collective. Returns the damage, or ''."""
+    """Check the maps against their checksums, each rank its own rows; collective. Returns a text on damage, or ''."""
     rows = np.empty(0)
     try:
         for name, dtype in contents.maps.items():
@@ -240,7 +239,7 @@ def verify(contents: Contents, slab: Slab) -> str:
 
 
 def read_maps(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
-    """Read the maps of a checkpoint into `entries`, in their units; collective."""
+    """Read the maps of a checkpoint into the maps of `entries`, in their units; collective."""
     maps = _maps(entries)
     hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():
@@ -255,7 +254,7 @@ def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
 
 
 def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
-    """Write the height files of a surface, unless they exist; collective. Raises InputError."""
+    """Write the height files of a job's surface, unless they exist; collective. Raises InputError."""
 
     def write() -> None:
         for heights in (shape.heights for shape in surface if isinstance(shape, HeightArray)):
@@ -271,7 +270,7 @@ def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str,
     """Return a stored job with the paths of its height files, in the directory of the checkpoint or its parent; root
     only.
 
-    Raises InputError for a missing file, unless the caller states that it is `elsewhere`.
+    Raises InputError for a missing file, unless `elsewhere` is True: the file may be in another place.
     """
     for index, shape in enumerate(job["surface"]):
         name = Path(shape.get("path", "/"))

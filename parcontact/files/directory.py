@@ -30,7 +30,7 @@ ADVICE = "give --restart never to start from the beginning, or --out for another
 
 
 class Directory:
-    """A directory of results. Only root accesses it; methods that are collective broadcast the result."""
+    """An output directory. Only root accesses it; collective methods broadcast the result."""
 
     def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
         self.path, self.slab, self.verb, self.outputs = path, slab, verb, outputs.BY_VERB[verb]
@@ -48,7 +48,7 @@ class Directory:
 
     @property
     def claim(self) -> Claim | None:
-        """Return the claim of this verb on root, None on other ranks."""
+        """Return the record of this command in the directory on root, None on other ranks."""
         return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:
@@ -65,8 +65,7 @@ class Directory:
             self._release()
 
     def refuse_foreign(self, job: Path, data: Mapping[str, Any], afresh: bool) -> None:
-        """Raise InputError if the directory has foreign files or results of another job; collective. `data`: the job as
-        plain data."""
+        """Raise InputError for foreign files, or for results of another job than `data` (plain data); collective."""
 
         def look() -> None:
             if not self.claims and not afresh and not self._has_checkpoints():
@@ -77,7 +76,7 @@ class Directory:
         self._on_root(look)
 
     def make(self, job: Path, resolved: str, claim: Claim) -> None:
-        """Write the marker and the job; collective. Raises InputError if the directory cannot be written."""
+        """Write the marker file and the job; collective. Raises InputError if the directory cannot be written."""
 
         def act() -> None:
             self._rename_foreign_files(job)
@@ -94,7 +93,8 @@ class Directory:
         self._on_root(act)
 
     def clear(self) -> None:
-        """Remove files of earlier runs of this verb; collective. Call it after `make`, which renames foreign files."""
+        """Remove files of earlier runs of this command; collective. Call it after `make`, which renames foreign
+        files."""
 
         def act() -> None:
             checkpoints = (path for _, path in self.saved())
@@ -104,7 +104,7 @@ class Directory:
         self._on_root(act)
 
     def go_back(self, step: int) -> None:
-        """Rename the checkpoints after a step, and remove unfinished files; collective."""
+        """Rename the checkpoints of later steps than `step`, and remove unfinished files; collective."""
 
         def act() -> None:
             for path in self._unfinished():
@@ -116,13 +116,13 @@ class Directory:
         self._on_root(act)
 
     def prune(self, keep: int) -> None:
-        """Remove all but the newest checkpoints; root only."""
+        """Remove all but the newest `keep` checkpoints; root only."""
         with suppress(OSError):  # superfluous checkpoints do no harm
             for _, path in self.saved()[keep:]:
                 path.unlink()
 
     def note(self, **facts: Any) -> None:
-        """Update this verb's claim in the marker; root only. Errors of writing are ignored."""
+        """Update this command's record in the marker file; root only. Errors of writing are ignored."""
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
@@ -220,8 +220,8 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a foreign directory has files of these names (except hidden and `PERMITTED` ones), or belongs
-    to a sweep."""
+    """Raise InputError if a foreign directory has files of these names (except hidden and `PERMITTED` files), or
+    belongs to a sweep."""
     foreign = sorted(name for name in names if not name.startswith(".") and name not in PERMITTED)
     if cases := len([*(directory / CASES).glob(f"*/{tables.MARKER}")]):
         raise InputError(
@@ -239,7 +239,7 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
 
 
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
-    """Raise InputError if a claim of the directory is for another scene than the job `data` (plain data)."""
+    """Raise InputError if a record in the directory belongs to another scene than the job `data` (plain data)."""
     for verb, claim in claims.items():
         if found := tables.list_differences(tables.differences(claim.job, data, SCENE)):
             raise InputError(

@@ -166,7 +166,7 @@ def _row_of(point: tuple[float, ...], saved: Mapping[int, tuple[float, ...]]) ->
 class FieldsFile(GrowingMaps):
     """Saved maps of a run over time; all methods are collective.
 
-    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; `steps` after which they are
+    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; `steps` after which maps are
     saved.
     """
 
@@ -181,12 +181,12 @@ class FieldsFile(GrowingMaps):
         self._kept: frozenset[int] = frozenset()
 
     def make(self, provenance: Provenance) -> None:
-        """Create the file; an existing one is replaced."""
+        """Create the file; an existing file is replaced."""
         self.provenance = provenance
         self._replace(None)
 
     def make_place(self, steps: Sequence[int]) -> None:
-        """Lay the file out for other future steps; saved maps are kept."""
+        """Make space in the file for other future steps; saved maps are kept."""
         found, _ = _found(self.path, self.slab)
         if found is not None:
             kept = found.reached(max(found.steps, default=0))
@@ -194,7 +194,7 @@ class FieldsFile(GrowingMaps):
             self._replace(found, kept)
 
     def resume(self, step: int, provenance: Provenance) -> str:
-        """Continue after a step: maps saved up to it are kept, even if other maps were requested then.
+        """Continue after a step: maps saved up to this step are kept, even if other maps were requested then.
 
         Returns a message about lost maps, or ''; an unreadable file is renamed. Raises InputError for a locked file.
         """
@@ -252,7 +252,7 @@ class FieldsFile(GrowingMaps):
 
 
 def cut_back(path: Path, slab: Slab, step: int) -> str:
-    """Mark the instants after a step as not reached, in a file that is not continued; collective.
+    """Mark all instants after a step as not reached, in a file that is not continued; collective.
 
     Returns a message about lost maps; raises InputError as `FieldsFile.resume`.
     """

@@ -1,4 +1,4 @@
-"""Writing of files that are never incomplete (temporary names), and renaming of foreign files."""
+"""Writing of files that are never incomplete, by temporary names, and renaming of foreign files."""
 
 import errno
 import os
@@ -74,7 +74,7 @@ def replace_file(path: Path, text: str) -> None:
 
 
 def is_marked(path: Path) -> bool:
-    """Return True if a page or a picture has the mark of this program; raises OSError."""
+    """Return True if a page or a picture was written by this program; raises OSError."""
     return MARK.encode() in path.read_bytes()
 
 

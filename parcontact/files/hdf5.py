@@ -1,7 +1,8 @@
-"""Maps in HDF5 files, written by MPI-IO if h5py supports it, else by the ranks in turn; files are the same either way.
+"""Maps in HDF5 files, written by MPI-IO if h5py supports it, else by the ranks in turn; both give the same files.
 
-A file is laid out for all maps before the first is written, and root writes everything else. Writing rows of maps does
-not change the structure, so a killed run leaves a readable file. An error on one rank is raised on all as RunError."""
+A file has space for all maps before the first is written, and root writes everything else. Writing rows of maps does
+not change the structure, so a killed run leaves a readable file. An error on one rank is raised on all as RunError.
+"""
 
 import errno
 import os
@@ -47,7 +48,7 @@ class Slice(NamedTuple):
 
 
 def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
-    """Write the rows of every rank; collective."""
+    """Write the rows of every rank to their places; collective."""
     _move(path, slab, list(parts), True)
 
 
@@ -95,8 +96,8 @@ def sync_one(path: Path) -> None:
 
 
 def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
-    """Return the result of `action` on root; collective. If it fails, raise `kind` on all ranks, with a message that
-    begins with `what`."""
+    """Run `action` on root and return its result on all ranks; collective. If it fails, raise `kind` on all ranks, with
+    a message that begins with `what`."""
 
     def attempt() -> T:
         try:
@@ -108,7 +109,7 @@ def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exc
 
 
 def raise_first(slab: Slab, problem: str) -> None:
-    """Raise RunError with the first rank's problem on all ranks; collective."""
+    """Raise RunError on all ranks with the `problem` of the first rank that has one ('' for none); collective."""
     if problem := next((text for text in slab.from_all(problem) if text), ""):
         raise RunError(problem)
 
@@ -199,9 +200,9 @@ def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
-    """Create a new file on root with `build(file)`, after an empty `block` [bytes]; collective.
+    """Create a new file on root by `build(file)`, after an empty `block` [bytes]; collective.
 
-    All maps take `size` bytes. The free space and the limit on file size for everything else are tested first.
+    All maps take `size` bytes. The free space on disk and the limit on file sizes are tested first.
     """
 
     def make() -> None:
@@ -229,7 +230,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
 
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
-    """Write whole datasets other than maps; root only."""
+    """Write whole datasets that are not maps; root only."""
     with h5py.File(path, "r", locking=False) as file:
         places = {name: file[name].id.get_offset() for name in values}
         types = {name: file[name].dtype for name in values}
@@ -240,7 +241,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
-    """Write the maps of an instant or point, and then its coordinates, the `marks`; collective."""
+    """Write the maps of an instant or point, and then its coordinates `marks`; collective."""
     write_rows(
         path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
     )
@@ -261,7 +262,7 @@ def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> N
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
-    """Add a dataset with all its space allocated, so that writing does not change the structure of the file."""
+    """Return a new dataset with all its space allocated, so that writing does not change the structure of the file."""
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
@@ -284,7 +285,7 @@ def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None
 def add_maps(
     file: h5py.File, slab: Slab, size: tuple[float, float], units: Mapping[str, str], leading: Sequence[str]
 ) -> None:
-    """Add coordinates x and y [m] of a box of this `size`, and maps with `units` by name, of shape (n, y, x).
+    """Add coordinates x and y [m] of a box of this `size`, and space for maps (n, y, x) with `units` by name.
 
     `leading` are the existing coordinates along the first axis.
     """

@@ -1,7 +1,7 @@
 """Provenance of files, and the header of a log.
 
 * Provenance in HDF5 files: the runs that made a file, and the references to cite.
-* The beginning of run.log: facts about the machine and the program, for diagnosis.
+* Beginning of run.log: facts about the machine and the program, for diagnosis.
 """
 
 import json
@@ -37,8 +37,8 @@ CHAIN_BYTES = 50_000  # tuning: largest text of a chain, an attribute of fixed s
 
 @dataclass(frozen=True)
 class Link:
-    """One run of a chain, or several identical ones in a row: the resolved job, and the step from which it
-    continued."""
+    """One run in a chain of restarts, or several identical runs in a row: the resolved job, and the step from which the
+    run continued."""
 
     job: str
     ranks: int
@@ -61,8 +61,8 @@ class Provenance:
     references: tuple[str, ...] = ()
 
     def write(self, file: h5py.File) -> None:
-        """Write the attributes of the file: program, resolved job (YAML), chain (JSON), error budget (JSON), ranks,
-        seeds, libraries, references."""
+        """Write the attributes of the file: program, resolved job (YAML), chain of runs (JSON), error budget (JSON),
+        ranks, seeds, libraries, references."""
         now = self.chain[-1]
         file.attrs["program"] = now.program
         file.attrs["job"] = now.job
@@ -95,12 +95,12 @@ class Provenance:
 
 
 def read_budget(file: h5py.File) -> dict[str, Any]:
-    """Return the error budget of the run so far, relative errors of friction and area by part; {} without one."""
+    """Return the error budget of the run so far: relative errors of friction and area by source, or {}."""
     return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 
 def extend_chain(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
-    """Return the chain with one more run; a run identical to the last one is only counted."""
+    """Return the chain with one more run; a run identical to the last one only raises its count."""
     if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
         return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
     return (*chain, link)
@@ -129,7 +129,7 @@ def cite_lines(job: dict[str, Any]) -> tuple[str, ...]:
 
 
 def references_of(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
-    """Return references of a resolved job (plain data) and further `features`, with their subjects.
+    """Return the references for a resolved job (plain data) and further `features`, each with its subject.
 
     Raises KeyError or TypeError for an incomplete job.
     """
@@ -160,7 +160,7 @@ GIGABYTE = 1e9
 
 
 def lines(comm: MPI.Intracomm) -> Iterator[str]:
-    """Yield version, host, command, MPI, ranks, batch job, and numbers of the machine."""
+    """Yield the lines of a log's header: version, host, command, MPI, ranks, batch job, and numbers of the machine."""
     words = [os.path.basename(sys.argv[0]), *sys.argv[1:]]
     yield f"{PROGRAM} on {socket.gethostname()}, process {os.getpid()}: {shlex.join(words)}"
     yield f"in {os.getcwd()}"

@@ -37,7 +37,7 @@ from .tables import MEND, GrowingTable, whole_lines
 
 @dataclass(frozen=True)
 class StepRow:
-    """An instant of a run, as in measures.csv; SI units, energies [J] since the start.
+    """Record of one instant of a run, a row of measures.csv; SI units, energies [J] since the start.
 
     `errors` is the error budget of the instant, None without contact. `added` are the values of the columns of effects.
     `remark` is a sentence for run.log about an unusual step, or ''.
@@ -78,7 +78,7 @@ class StepRow:
 
 
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
-    """Return the names of the columns, with the dissipation of `branches` and columns `added` by effects.
+    """Return the columns of measures.csv, with the dissipation of `branches` and columns `added` by effects.
 
     Raises InputError for a repeated name.
     """
@@ -89,7 +89,7 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
 
 
 def row_numbers(row: StepRow, branches: int) -> list[float]:
-    """Return the values of a row in the order of `columns`; NaN if not requested."""
+    """Return the values of a row in the order of `columns`; NaN for columns that were not requested."""
     return [*values_of(_always(branches), row), *row.added]
 
 
@@ -99,7 +99,7 @@ def _always(branches: int) -> list[Column]:
 
 
 class MeasuresFile(GrowingTable):
-    """The growing measures.csv of a run; `table` is its state."""
+    """The growing measures.csv of a run; `table` is its present state."""
 
     def __init__(self, path: Path, table: TableMark, branches: int = 0, added: Sequence[str] = ()) -> None:
         """Continue the file with the state `table`, or begin it."""
@@ -116,10 +116,10 @@ class MeasuresFile(GrowingTable):
 def cut_back_table(
     path: Path, step: int, then: TableMark, branches: int = 0, added: Sequence[str] = ()
 ) -> tuple[TableMark, list[str]]:
-    """Remove rows after `step`, and an incomplete row; the columns become the columns of the present job.
+    """Remove rows after `step`, and an incomplete row, and change the columns to those of the present job.
 
-    `then` is the state when the checkpoint was written: its last row is added if the disk was full. Returns the new
-    state and messages on lost rows. Raises InputError for a damaged file, which is not changed.
+    `then` is the table's state when the checkpoint was written: its last row is added if the disk was full. Returns the
+    new state and messages on lost rows. Raises InputError for a damaged file, which is not changed.
     """
     if not path.exists():
         return TableMark(), [f"{path} is missing: the rows up to step {step} are lost"]
@@ -156,7 +156,7 @@ LEFT_SECONDS = 30.0  # tuning: time between lines with the time left, without a 
 
 
 def step_line(row: StepRow) -> str:
-    """Return the line of a step, under `HEAD`."""
+    """Return the line on a step that a run prints under the heading `HEAD`."""
     m = row.measures
     return (
         f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {m.friction:9.6f} "
@@ -165,17 +165,17 @@ def step_line(row: StepRow) -> str:
 
 
 def warnings_of(log: Path) -> list[str]:
-    """Return the different warnings in a log, in order; none without a log."""
+    """Return all different warnings in a log, in order; an empty list without a log."""
     return list(dict.fromkeys(line.removeprefix(WARNING) for line in log_lines(log) if line.startswith(WARNING)))
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return the last message of a log on chosen meshes (`march.mesh`), if any."""
+    """Return the last message of a log on chosen meshes (`march.mesh`); an empty list if there is none."""
     return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 
 def log_lines(log: Path) -> list[str]:
-    """Return the lines of a log without time stamps; none without a log."""
+    """Return the lines of a log without time stamps; an empty list without a log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
 
@@ -208,7 +208,7 @@ class Console:
             self._write(f"{WARNING}{printable(text)}", sys.stderr)
 
     def step(self, row: StepRow) -> None:
-        """Print the line of a step, and update the progress."""
+        """Print the line of a step, and update the progress bar."""
         text = step_line(row)
         self.log(text)
         if self._quiet:
@@ -239,7 +239,7 @@ class Console:
             self._write(f"# step {step} of {self._total}, about {clock} left")
 
     def expect(self, total: int) -> None:
-        """Set the total number of steps, as far as known."""
+        """Set the total number of steps of the progress bar, as far as known."""
         self._total = total
         if self._bar is not None:
             self._bar.total = total
@@ -260,8 +260,11 @@ class Console:
 
 @dataclass(frozen=True)
 class Recording:
-    """Outputs of a run of `total` steps (an estimate if `open_ended`). The table has the dissipation of `branches` and
-    the columns `added` by effects; `maps` of a box of this `size` [m] are saved after `every` steps."""
+    """Outputs of a run of `total` steps (an estimate if `open_ended`).
+
+    measures.csv has the dissipation of `branches` and the columns `added` by effects; `maps` of a box of this `size`
+    [m] are saved after `every` steps.
+    """
 
     total: int
     branches: int = 0
@@ -281,7 +284,7 @@ class Recording:
 class Recorder:
     """Writes the outputs of every step; the constructor and all methods but `close` are collective.
 
-    `saved` is the state in a checkpoint from which the run continues. Raises InputError if files cannot be written.
+    `saved` are the contents of a checkpoint from which the run continues. Raises InputError if files cannot be written.
     `warnings` are messages on lost results of an earlier run, `problem` is a message on results that cannot be written.
     """
 
@@ -328,8 +331,8 @@ class Recorder:
         return self._measures.table if self._measures else TableMark()
 
     def write(self, row: StepRow, field: Callable[[str], Array], total: int = 0) -> None:
-        """Record an instant; `field(name)` returns this rank's rows of a map. `total` is the expected number of steps
-        of an open-ended run.
+        """Record an instant in all files; `field(name)` returns this rank's rows of a map. `total` is the expected
+        number of steps of an open-ended run.
 
         A failure is stored in `problem`, so that the run saves its state before it ends.
         """
@@ -381,7 +384,7 @@ class Recorder:
             self._fields.renew(provenance)
 
     def sync(self, provenance: Provenance) -> None:
-        """Flush all records and the provenance to disk.
+        """Flush all files, with the new provenance, to disk.
 
         A failure is stored in `problem` if results are lost, else in `warnings`.
         """

@@ -28,7 +28,7 @@ SAME_STEP = 1e-9  # rounding: relative difference below which steps of two histo
 
 @dataclass(frozen=True)
 class RestartPoint:
-    """A sound checkpoint from which a run continues; `own` if it is in the run's output directory."""
+    """An undamaged checkpoint from which a run continues; `own` is True if it is in the run's output directory."""
 
     contents: Contents
     own: bool
@@ -61,7 +61,7 @@ def choose_origin(
 
 
 def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
-    """Return the claim of a run for the marker; its id is kept if it continues in its own directory."""
+    """Return the record of a run for the marker file; its id is kept if the run continues in its own directory."""
     new = Claim(tables.kept(plain))
     return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new
 
@@ -69,7 +69,7 @@ def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
 def finished_before(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, timeline: Timeline
 ) -> str:
-    """Return a message if a run of this job has finished without keeping a checkpoint, or ''; collective."""
+    """Return a message if a run of this job finished earlier without keeping a checkpoint, else ''; collective."""
 
     def look() -> str:
         claim = directory.claim
@@ -86,7 +86,7 @@ def finished_before(
 
 
 def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
-    """Return the contents of a checkpoint from which a job can continue, or why it cannot; collective.
+    """Return the contents of a checkpoint from which a job can continue, or a text on why it cannot; collective.
 
     Raises InputError if the history before the checkpoint differs.
     """
@@ -146,7 +146,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Return a message on the first completed step that differs in this job, or ''; later steps may differ."""
+    """Return a message on the first completed step that this job has changed, or ''; later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
     kind: Any = type(job).model_fields["history"].annotation
     history = TypeAdapter(kind).validate_python(contents.job["history"])

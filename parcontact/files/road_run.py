@@ -1,8 +1,9 @@
 """Run of a job in bands with a history, in its output directory: marches in rounds, then all rows at once.
 
-Rows of an instant exist when the coarsest band is done. Until then finished marches are kept in a file
-(`contact_store`), so that a run that was stopped or killed goes on with the next march. `--until T` ends the history at
-T: the marches of a longer history are others."""
+A march is the calculation of one band, step by step, through the history. Rows exist when the coarsest band is done.
+Until then finished marches are stored in a file (`bands.cascade.ContactStore`), so that a stopped or killed run goes on
+with the next march. `--until T` ends the history at T; a longer history needs new marches.
+"""
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -36,7 +37,7 @@ class _StopError(Exception):
 
 
 def run_history(job: Job, slab: Slab, options: Options) -> int:
-    """Run a job, or go on with it; collective. Return the exit code. Nothing is written before the job is checked."""
+    """Run a job, or continue it; collective. Return the exit code. Nothing is written before the job is checked."""
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: auto or never was expected for a job in bands, got {options.restart}: {RENEWED}")
     job = ended(job, options.until)
@@ -65,7 +66,7 @@ def run_history(job: Job, slab: Slab, options: Options) -> int:
 
 
 def ended(job: Job, until: float | None) -> Job:
-    """Return a job whose history ends at `until` [s]. Raises InputError for a later time than its end."""
+    """Return the job with a history that ends at `until` [s]. Raises InputError if the history ends earlier."""
     if until is None:
         return job
     kept, start = [], 0.0
@@ -192,8 +193,7 @@ class _Run:
 
 
 def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
-    """Yield sentences on the errors of friction and area of rows that slide: the mean over the rows, and the largest
-    with its parts."""
+    """Yield sentences on errors of friction and area of rows that slide: the mean, and the largest with its parts."""
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
     slid = rows[-1].distance > 0.0

@@ -36,9 +36,9 @@ from .tables import Claim
 
 
 class Run:
-    """A march through its history, with its files; methods are collective.
+    """A run of a job: a march through its history, with files; methods are collective.
 
-    `facts` are stored in its checkpoints.
+    `facts` are stored in all checkpoints.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Run:
         self.began, self.saving = time.monotonic(), 0.0
 
     def go(self, saved: Contents | None) -> int:
-        """Run to the end, from the start or from a checkpoint; returns the exit code. Raises RunError."""
+        """Run to the end, from the start or from the checkpoint `saved`; returns the exit code. Raises RunError."""
         self._log_start(saved)
         if saved:
             self.recorder.catch_up(self.march.row, self.march.field)
@@ -264,7 +264,7 @@ def chosen_by_accuracy(job: Job) -> set[str]:
 
 @dataclass(frozen=True)
 class Ended:
-    """End of a run: its exit code and its last march, or the checkpoint if there was nothing to do."""
+    """End of a run: the exit code and the last march, or the checkpoint if there was nothing to do."""
 
     code: int
     march: March | None
@@ -277,7 +277,7 @@ def run_job(job: Job, slab: Slab, options: Options) -> int:
 
 
 def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
-    """Run a job, as `run_job`; returns its end, from which it can continue in memory."""
+    """Run a job, as `run_job`; returns its end, from which a run can continue in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
         plain = listing.plain_job(job) if slab.root else {}
@@ -347,7 +347,7 @@ def _refuse_damaged(directory: Path) -> None:
 
 
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:
-    """Return the provenance of the files of a run that begins or continues from a checkpoint."""
+    """Return the provenance for the files of a run that begins, or continues from the checkpoint `saved`."""
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extend_chain(saved.chain if saved else (), link)

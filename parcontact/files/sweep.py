@@ -37,8 +37,8 @@ class SweepRun:
     """A sweep of `cases`, to each of which `act` is applied; the constructor and all methods are collective.
 
     Groups of ranks take cases in turn, one at a time. `act` gets a job, the slab of the group, and a function that
-    tells if a warning is shown. `limit` is the latest end (time of `time.monotonic`); `shown` are warnings that were
-    already shown. Failures are recorded only if `runs` is True: `act` runs the cases.
+    returns True if a warning is to be shown. `limit` is the latest end (time of `time.monotonic`); `shown` are warnings
+    that were already shown. Failures are recorded only if `runs` is True: `act` runs the cases.
     """
 
     cases: Sequence[Case]
@@ -59,9 +59,9 @@ class SweepRun:
         """Run the selected cases and collect the results of all cases; returns the exit code.
 
         A failed case does not stop the others, but gives exit code 1; if all cases are refused as bad input, it is 2.
-        Finished cases, and those that another program runs, are skipped; if only such a running case is selected,
-        InUseError is raised. A case that stops early with a checkpoint stops the sweep and the cases at the same time,
-        but no other program; so do signals, the end of the wall time, and the file `stop`, which also stops other
+        Finished cases, and cases that another program runs, are skipped; if only such a running case is selected,
+        InUseError is raised. A case that stops early with a checkpoint stops the sweep with the cases that run at the
+        same time, but no other program. So do signals and the end of the wall time. The file `stop` also stops other
         programs and is not removed. The same command continues the sweep.
         """
         with Signals().noted() as signals:  # also on waiting ranks, whose end would end the others
@@ -187,7 +187,7 @@ def unfinished_first(chosen: Sequence[Case]) -> list[int]:
 
 
 def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
-    """Return the jobs of all cases to be run; root only."""
+    """Return the jobs of all cases that still have to run; root only."""
     return [case.job for case in chosen if afresh or sweep_table.state(case) != "done"]
 
 

@@ -12,14 +12,14 @@ Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
 
 
 class SweepWarnings:
-    """Warnings by subject; subjects `shown` before are not shown again, others `at_once` or at the end."""
+    """Warnings of a sweep by subject. Subjects `shown` before are not shown again; others `at_once` or at the end."""
 
     def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
         self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1
         self.kinds: Kinds = {}
 
     def begin(self, case: int) -> None:
-        """Set the case of the following warnings."""
+        """Set the case to which the following warnings belong."""
         self._case = case
 
     def shows(self, doubt: Doubt) -> bool:

@@ -1,21 +1,19 @@
-"""Tables and markers of an output directory: what is there, and reading it.
+"""Tables and markers of an output directory: what is there, and how it is read and extended.
 
-Tables of numbers in csv files: reading, also while they grow, and appending.
+Tables of numbers are csv files, which may be read while they grow.
 
-The marker of an output directory: the verbs that wrote it, their jobs and run ids.
+The marker of an output directory names the commands that wrote it (verbs), their jobs and run ids.
 
 Only files that the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
 
-The points of a friction curve: requested ones, and those missing in its table.
+Points of a friction curve are compared with the points in its table to find the missing ones.
 
-steady.lost.json: points of a friction curve that could not be solved, with the reasons.
+steady.lost.json has the points of a friction curve that could not be solved, with the reasons.
 
-Stop files: files that make running programs stop.
-
-Reading of tables of results for display; incomplete tables are refused.
+Stop files make running programs stop.
 
 A growing table must have all rows that the marker or a checkpoint states. A table written at once must end with a whole
-line.
+line. Other tables are refused as incomplete.
 """
 
 import json
@@ -94,7 +92,7 @@ class Columns(dict[str, list[float]]):
 
 
 def read_columns(path: Path) -> Columns:
-    """Read the columns of a table by name, also of a growing one; empty cells are NaN.
+    """Return the columns of a table by name, also of a growing table; empty cells are NaN.
 
     Raises InputError with the line for anything but numbers.
     """
@@ -126,8 +124,8 @@ SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a j
 
 @dataclass(frozen=True)
 class Claim:
-    """The claim of a verb: the `id` of its run, its job, and whether it `saved` a checkpoint; the step and time (of a
-    curve: the number of points) after which it `finished`; how surfaces `detached`."""
+    """Record of a command in an output directory: the `id` of its run, its job, and whether it `saved` a checkpoint;
+    the step and time (of a curve: the number of points) after which it `finished`; how surfaces `detached`."""
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
@@ -137,12 +135,12 @@ class Claim:
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sections of a job (plain data) that a marker keeps."""
+    """Return the sections of a job (plain data) that are stored in the marker file."""
     return {name: data[name] for name in SECTIONS if name in data}
 
 
 def read_claims(directory: Path) -> dict[str, Claim]:
-    """Read the claims of a directory by verb, none without a marker; raises OSError or ValueError."""
+    """Return the records of commands in a directory, by verb; empty without a marker. Raises OSError or ValueError."""
     path = directory / MARKER
     try:
         text = path.read_bytes()
@@ -159,7 +157,7 @@ def read_claims(directory: Path) -> dict[str, Claim]:
 
 
 def sound_claims(directory: Path) -> dict[str, Claim]:
-    """Return the claims of a directory; raises InputError for an unreadable marker."""
+    """Return the records of commands in a directory; raises InputError for an unreadable marker."""
     try:
         return read_claims(directory)
     except (OSError, ValueError) as error:
@@ -167,7 +165,7 @@ def sound_claims(directory: Path) -> dict[str, Claim]:
 
 
 def claim_of_run(directory: Path) -> Claim | None:
-    """Return the claim of the run in a directory, or None; raises InputError for an unreadable marker."""
+    """Return the record of the run in a directory, or None; raises InputError for an unreadable marker."""
     return sound_claims(directory).get("run")
 
 
@@ -197,14 +195,14 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
 
 
 def list_differences(differences: Iterator[str]) -> str:
-    """Return the first differences and the number of further ones, in one line."""
+    """Return a line with the first differences and the number of further ones."""
     first = list(islice(differences, SHOWN))
     more = sum(1 for _ in differences)
     return "; ".join(first) + (f"; and {more} more" if more else "")
 
 
 def keep_mesh(job: Mapping[str, Any], different: str) -> str:
-    """Return advice to keep the mesh of a job (plain data) if it is among the differences, else ''."""
+    """Return advice to keep the mesh of a job (plain data) if the text `different` names it, else ''."""
     if "grid.points" not in different:
         return ""
     points = str(job["grid"]["points"]).replace(" ", "")
@@ -228,7 +226,7 @@ Place = tuple[float, ...]  # speed [m/s], mean pressure [Pa], and temperature [d
 
 
 class Wanted(NamedTuple):
-    """A steady state: speed [m/s], mean pressure [Pa], temperature [deg C] (NaN: the temperature of the material)."""
+    """Parameters of a steady state: speed [m/s], mean pressure [Pa], temperature [deg C] (NaN: of the material)."""
 
     speed: float
     pressure: float
@@ -242,13 +240,13 @@ class Wanted(NamedTuple):
 def requested_points(
     speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()
 ) -> list[Wanted]:
-    """Return all combinations of speeds, pressures and temperatures without repetition, in the order of solution."""
+    """Return all combinations of speeds, pressures and temperatures, without repetition, in the order of solution."""
     order = product(temperatures or (math.nan,), pressures, speeds)
     return list(dict.fromkeys(Wanted(speed, pressure, temperature) for temperature, pressure, speed in order))
 
 
 def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:
-    """Return the points in the columns of a table."""
+    """Return the points of a friction curve that are in the columns of its table."""
     speeds = columns["velocity"]
     degrees = columns.get("temperature", [math.nan] * len(speeds))
     return list(map(Wanted, speeds, columns["pressure"], degrees))
@@ -270,14 +268,14 @@ PLACE = ("velocity", "pressure", "temperature")
 
 
 class LostPoint(NamedTuple):
-    """A point that could not be solved, and the reason."""
+    """A point of a friction curve that could not be solved, and the reason."""
 
     at: Wanted
     why: str
 
 
 def read(directory: Path) -> list[LostPoint]:
-    """Return the lost points of a curve, without those that were solved later; raises InputError for a damaged file."""
+    """Return the lost points of a curve, except points that were solved later; raises InputError for a damaged file."""
     path = directory / FILE
     if not path.is_file():
         return []
@@ -292,7 +290,7 @@ def read(directory: Path) -> list[LostPoint]:
 
 
 def without(lost: Sequence[LostPoint], solved: Sequence[Wanted]) -> list[LostPoint]:
-    """Return the points that are not among the solved ones."""
+    """Return the lost points that are not among the solved ones."""
     return [lost[k] for k in lacking_points([one.at for one in lost], solved)]
 
 

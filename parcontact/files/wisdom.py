@@ -1,7 +1,8 @@
 """FFTW's wisdom (choices of fastest transforms, found by timing), stored so that repeated runs give the same digits.
 
-The first choice for a kind of run is kept in the user's private cache directory, and in checkpoints, for continuation
-on other machines."""
+The first choice for a kind of run is stored in the user's private cache directory, and in checkpoints, so that a run
+can continue on another machine.
+"""
 
 import hashlib
 import json
@@ -24,7 +25,7 @@ from .provenance import processor
 
 
 def gather(slab: Slab) -> NDArray[np.uint8]:
-    """Return the wisdom of all ranks, for a checkpoint; collective."""
+    """Return the FFTW wisdom of all ranks, for a checkpoint; collective."""
     everyone = [wisdom.decode("latin-1") for wisdom in slab.from_all(export_wisdom())]
     different = list(dict.fromkeys(everyone))
     text = json.dumps({"plans": different, "of": [different.index(wisdom) for wisdom in everyone]})
@@ -32,8 +33,8 @@ def gather(slab: Slab) -> NDArray[np.uint8]:
 
 
 def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Use the wisdom of a checkpoint, if it has as many ranks, else the wisdom of the first run on this machine with
-    the same `transforms` (`scene.Choices`); collective."""
+    """Use the wisdom of a checkpoint, if it has as many ranks, else the stored wisdom of this machine's first run with
+    the same `transforms` (`march.choices.Choices`); collective."""
 
     def kept() -> bytes:
         with suppress(OSError):
@@ -46,7 +47,7 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Store the wisdom of this run for later ones, unless theirs is as large; collective."""
+    """Store the wisdom of this run for later runs, unless the stored wisdom is as large; collective."""
     data = gather(slab).tobytes()
     with suppress(OSError):  # a run without stored wisdom works too
         place = _place(transforms, slab) if slab.root else None

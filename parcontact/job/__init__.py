@@ -1,4 +1,4 @@
-"""A job: the description of a simulation, read from a YAML file or a mapping into frozen sections."""
+"""The job: the description of a simulation, read from a YAML file or a mapping into frozen sections."""
 
 from ..errors import JobError
 from .calculation import Checkpoint, Grid, Numerics, Output, Study

@@ -1,22 +1,20 @@
-"""Suggestions of settings, for warnings and messages.
+"""Suggestions of settings and warnings about settings that are probably not meant: mesh, box and time steps.
 
-Rules for a job as a whole, and warnings about settings that are allowed but probably not meant.
-
-Cells that the shortest wave of a surface needs along and across the sliding direction.
+Meshes need a number of cells per shortest wave of the surface, along and across the sliding direction.
 
 The mesh causes two kinds of errors of friction and contact area, both at edges of contact. Systematic errors grow with
 the phase of the modulus, because the pressure at one edge of a spot is steeper than at the other. Random errors come
 from the positions of edges between points: with a share A in contact, the relative standard deviation at one place is
 ((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 places. `friction_error` and `area_error` add
-both; random errors, and the scatter of systematic ones between surfaces, count SURE standard deviations.
+both; random errors, and the scatter of systematic errors between surfaces, count SURE standard deviations.
 
-The constants were fitted with share and phase as guessed by `march.mesh`, to steady states of rough surfaces of
-1 to 100 % contact with 12 or 24 shortest waves along a side: for friction 36 states on about 110 meshes each, for the
-area 24 states on about 40 meshes (maximum likelihood), with references of 160 cells per shortest wave. Fewer waves
+The constants were fitted by maximum likelihood, with share and phase as guessed by `march.mesh`. Data are steady states
+of rough surfaces of 1 to 100 % contact with 12 or 24 shortest waves along a side: for friction 36 states on about 110
+meshes each, for the area 24 states on about 40 meshes, with references of 160 cells per shortest wave. Fewer waves
 count as 12. `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is
 hypot(x dx, y dy) long. Without sliding both axes count as along the sliding direction.
 
-Warnings about the resolution of a job: mesh, box, and time steps; `meaning.py` has physics, `size.py` memory.
+Warnings about physics are in `meaning.py`, about memory in `machine.py`.
 """
 
 from __future__ import annotations
@@ -61,7 +59,7 @@ class Sections(Protocol):
         """Return True if an effect shears the contact before it slides."""
 
     def asked(self, name: str) -> list[Any]:
-        """Return what the effects whose sections are given have under a name."""
+        """Return the attribute `name` of each effect whose section the job has."""
 
 
 Vector = tuple[float, float]
@@ -82,8 +80,9 @@ SAME = 1e-9  # rounding: relative difference below which numbers are the same
 
 
 class Guess(NamedTuple):
-    """A guess before the solution: the share in contact, the phase of the modulus at the frequency of edges [units of
-    90 degrees], the number of shortest waves along a side of the box, and the slowness of sliding, `slow`, 0 to 1."""
+    """A guess of the contact before it is solved: `share` in contact, `phase` of the modulus at the frequency of edges
+    [units of 90 degrees], number of shortest `waves` along a side of the box, and slowness of sliding `slow` (0 to
+    1)."""
 
     share: float
     phase: float
@@ -92,19 +91,19 @@ class Guess(NamedTuple):
 
     @property
     def spread(self) -> float:
-        """Return the relative standard deviation of the contact at one place."""
+        """Return the relative standard deviation of the contact area at one place."""
         return math.sqrt((1.0 - self.share) / self.share)
 
     @property
     def few(self) -> float:
-        """Return the ratio of random errors to the random errors in a box of FEW waves."""
+        """Return the ratio of random errors to their value in a box of FEW waves."""
         return FEW / max(self.waves, FEW)
 
 
 def friction_error(c: float, across: float, guess: Guess) -> float:
     """Return the relative error of friction that nine of ten surfaces keep with `c` cells per shortest wave along the
-    sliding and `across` cells across it. Slow sliding adds the power lost in waves shorter than the cells; the last
-    term matters for few cells only."""
+    sliding and `across` cells across. Slow sliding adds the power lost in waves shorter than the cells; the last term
+    matters only for few cells."""
     along = (4.0 / c) ** 1.5
     steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
     counted = math.hypot((4.0 / c) ** 2.15, 0.13 * (4.0 / across) ** 2.7)
@@ -114,8 +113,9 @@ def friction_error(c: float, across: float, guess: Guess) -> float:
 
 
 def area_error(c: float, across: float, guess: Guess) -> float:
-    """Return the relative error of the corrected contact area, as `friction_error`. The correction is too large for
-    elastic bodies, and too small at edges across the sliding of viscoelastic bodies."""
+    """Return the relative error of the corrected contact area that nine of ten surfaces keep; arguments as in
+    `friction_error`. The correction is too large for elastic bodies, and too small at edges across the sliding of
+    viscoelastic bodies."""
     along, aside = 4.0 / c, 4.0 / across
     known = 0.067 * guess.phase * along - 0.005 * (along + aside)
     chance = guess.few * 0.0078 * math.hypot(along**1.2, 0.7 * aside**1.6)
@@ -128,7 +128,7 @@ def one_cell(stage: Stage, grid: Grid) -> float:
 
 
 def along(way: Vector, length: float, grid: Grid) -> float:
-    """Return the length of a cell [m] along the vector `way` of the given length."""
+    """Return the length of a cell [m] along the vector `way`, whose length is given."""
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
@@ -145,23 +145,23 @@ def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
 
 
 def cells_per_wave(accuracy: float) -> int:
-    """Return the cells per shortest wave of a rough surface along the sliding, for friction."""
+    """Return the cells per shortest wave along the sliding that friction needs for an `accuracy`."""
     return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME)))
 
 
 def cells_across(accuracy: float) -> float:
-    """Return the cells per shortest wave across the sliding, for friction."""
+    """Return the cells per shortest wave across the sliding that friction needs for an `accuracy`."""
     return max(LEAST_CELLS, 4.0 * (FRICTION_ASIDE / accuracy) ** (1.0 / FRICTION_ASIDE_ORDER))
 
 
 def cells_for_area(accuracy: float) -> float:
-    """Return the cells per shortest wave along the sliding, for the contact area."""
+    """Return the cells per shortest wave along the sliding that the contact area needs for an `accuracy`."""
     return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
 
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
-    """Return the cells per shortest wave along an axis, for friction and for the contact area, of a surface that slides
-    along `directions` (unit vectors); without sliding both are for the area."""
+    """Return the cells per shortest wave along an axis that friction and the contact area need, for a surface that
+    slides along `directions` (unit vectors); without sliding, twice the number for the area."""
     if not directions:
         return cells_for_area(asked.area), cells_for_area(asked.area)
     if any(abs(way[axis]) > ASIDE for way in directions):
@@ -191,7 +191,7 @@ def more_points(grid: Grid) -> str:
 
 
 def fast_length(least: float) -> int:
-    """Return the smallest multiple of MULTIPLE from `least` on whose other prime factors are 2, 3 and 5."""
+    """Return the smallest multiple of MULTIPLE, at least `least`, whose other prime factors are 2, 3 and 5."""
     count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME)))
     while 60 ** count.bit_length() % count:  # 60 = 2 * 2 * 3 * 5
         count += 1
@@ -201,9 +201,9 @@ def fast_length(least: float) -> int:
 def choose_points(
     wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
 ) -> tuple[int, int]:
-    """Return the least points along x and y for the errors `asked`, for a surface with this shortest wave [m] that
-    slides along `directions` (unit vectors), or does not slide. Among meshes with equal numbers of points the mesh with
-    the smallest larger side is returned."""
+    """Return the numbers of points along x and y of the smallest mesh that meets the accuracies `asked`, for a surface
+    with this shortest wave [m] that slides along `directions` (unit vectors), or does not slide. Of equally large
+    meshes, the one with the shortest longer side is returned."""
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
     x, y = (wave / length for length in size)
@@ -244,7 +244,7 @@ SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
 def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:
-    """Yield warnings in the order of the sections. The cells of a mesh that was chosen for the job are not checked."""
+    """Yield warnings about mesh, box and time steps, section by section, but not about a mesh chosen for the job."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
@@ -287,7 +287,7 @@ WARN_LARGE_BOX = Kind(
 
 
 def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
-    """Yield a warning about a box of more than MOST_LONG_WAVES longest waves."""
+    """Yield a warning about a box that is longer than MOST_LONG_WAVES longest waves."""
     length = max((length for _, length, _ in _directions(grid)), default=0.0)
     if length > MOST_LONG_WAVES * shape.long_wavelength:
         of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}

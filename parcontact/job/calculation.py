@@ -1,15 +1,13 @@
-"""Sections of the job for calculation, bands and temperature.
+"""Sections of a job on the calculation: `grid`, `body`, `numerics`, `output`, `checkpoint`, `study`, `bands`, `shift`.
 
-Shares of solver, folded branches, time steps and mesh in the requested accuracy.
+Solver, folded branches, time steps and mesh have shares in the requested accuracy.
 
-They are shares of true errors and add up to 1. Estimates exceed errors, so that they hold in nearly all scenes: in
-the median by SOLVER_MEDIAN and TIME_MEDIAN. An estimate may exceed its share by this factor.
+These are shares of true errors and add up to 1. Estimates exceed true errors in the median by the factors SOLVER_MEDIAN
+and TIME_MEDIAN, so that they hold in nearly all scenes. An estimate may exceed its share by this factor.
 
-The `grid`, `body`, `numerics`, `output`, `checkpoint` and `study` sections.
+`bands` cuts the spectrum of a surface into bands, each solved on a grid of its own.
 
-The `bands` section: the spectrum of a surface cut into bands, each solved on a grid of its own.
-
-The `shift` of a material: how its relaxation times and moduli depend on temperature (`parcontact.rubber.shift`).
+`shift` of a material states how relaxation times and moduli depend on temperature (`parcontact.rubber.shift`).
 """
 
 from __future__ import annotations
@@ -140,14 +138,14 @@ FRACTION: TypeAdapter[float] = TypeAdapter(Fraction)
 
 
 class Accuracy(Part):
-    """Relative errors of friction and of the corrected contact area that are acceptable."""
+    """Accepted relative errors of friction and of the corrected contact area."""
 
     friction: Fraction = Field(default=1e-2, description="an error of friction [-] above 0 and below 1")
     area: Fraction = Field(default=1e-2, description="an error of the contact area [-] above 0 and below 1")
 
     @property
     def both(self) -> tuple[float, float]:
-        """Return the accuracies of friction and of the area."""
+        """Return the accuracies of friction and of the area as a pair."""
         return self.friction, self.area
 
     @property
@@ -156,7 +154,8 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """Return the error of friction that time steps may cause; the error of the area is at most a quarter of it."""
+        """Return the relative error of friction that time steps may cause; the area then has at most a quarter of this
+        error."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 
@@ -196,7 +195,7 @@ class Numerics(Part):
 
     @property
     def chosen(self) -> dict[str, float]:
-        """Return the values that the accuracy chose, by key."""
+        """Return the values that the program chose by the accuracy, by key."""
         return self._chosen
 
     @property
@@ -238,7 +237,7 @@ class Output(Part):
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """Return the names of the maps of the fields; a vector has one map for each component."""
+        """Return the names of the maps of all fields; a vector has one map for each component."""
         return tuple(name for field in self.fields for name in components_of(field))
 
 
@@ -253,7 +252,7 @@ class Checkpoint(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Save every 10 minutes by default."""
+        """Return `data` with checkpoints every 10 minutes by default."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 
 
@@ -267,7 +266,7 @@ def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 class Study(Part):
-    """Lists of values (ladders) for `parcontact study`; a missing ladder is the value of the job."""
+    """Lists of values (ladders) for `parcontact study`; a missing ladder is the single value of the job."""
 
     mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of positive whole numbers of points along x"
@@ -313,7 +312,7 @@ LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
 
 
 class Bands(Part):
-    """Bands of the spectrum; keys that are not given follow from `numerics.accuracy`."""
+    """Bands of the spectrum of a surface; keys that are not given follow from `numerics.accuracy`."""
 
     count: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="a whole number of bands from 1 to 100"
@@ -411,7 +410,7 @@ class DensityLaw(Part):
     expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more (rubber: 6e-4)")
 
     def at(self, reference: float) -> Density:
-        """Return the law with the reference of its shift [deg C]."""
+        """Return the law with the reference temperature of its shift [deg C]."""
         return Density(self.expansion, reference)
 
 
@@ -425,7 +424,7 @@ class ModulusFactors(Part):
     rules = (Rule(("temperatures", "logs"), _rising),)
 
     def at(self, reference: float) -> Factors:
-        """Return the law with the reference of its shift [deg C]."""
+        """Return the law with the reference temperature of its shift [deg C]."""
         return Factors(self.temperatures, self.logs, reference)
 
 
@@ -488,7 +487,7 @@ Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_inpu
 
 
 def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
-    """Check that a material with a temperature has a shift that reaches it."""
+    """Yield an error unless a material with a temperature has a shift that reaches it."""
     if temperature is None:
         return
     if shift is None:

@@ -1,9 +1,9 @@
 """The history of a job as steps, given or chosen.
 
 Given steps have a constant length or grow by a constant factor: they follow from the job and their number, so that a
-restart needs only this number. Stages may choose their own steps, within bounds: the next step is decided after the one
-before has been made (`march.controller`). Chosen steps are stored, so that steps have numbers and a run can restart.
-Steps to come are estimated as a ladder: they double from the shortest to the longest that is allowed and then stay
+restart needs only the number of the last step. Stages may choose their own steps, within bounds: the next step is
+decided after the one before has been made (`march.controller`). Chosen steps are stored, so that steps have numbers and
+a run can restart. Future steps are estimated: they double from the shortest to the longest allowed length and then stay
 constant.
 """
 
@@ -32,7 +32,7 @@ CYCLE_STEPS = 32  # accuracy: least number of steps in a cycle of an oscillation
 
 
 def reached(time: float, until: float) -> bool:
-    """Return whether a time equals the requested one or is later."""
+    """Return True if a time equals `until` or is later, up to rounding."""
     return time >= until * (1.0 - SAME_TIME)
 
 
@@ -58,8 +58,8 @@ class Bounds:
 
 
 def most_cells(job: Planned) -> int:
-    """Return the largest number of cells slid in a step: the largest power of two up to a quarter of the shortest wave.
-    It is one cell if a quarter wave is shorter, or if a file may have any wave."""
+    """Return the largest number of cells that a step may slide: the largest power of two up to a quarter of the
+    shortest wave; one if a quarter wave is shorter than a cell, or if a file may have any wave."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
     for shape in job.surface:
@@ -73,14 +73,14 @@ def most_cells(job: Planned) -> int:
 
 
 def longest_change(stage: Stage) -> float:
-    """Return the longest step [s] that follows the load, or the phase of an oscillation."""
+    """Return the longest step [s] that still follows the change of the load, or the phase of an oscillation."""
     if stage.frequency:
         return 1.0 / (CYCLE_STEPS * stage.frequency)
     return stage.seconds if stage.constant else stage.seconds / RAMP_STEPS
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """Return the bounds of steps that slide by at most `cells`; at rest the longest is the whole stage."""
+    """Return the bounds on steps of a stage that slide by at most `cells`, at rest at most the whole stage."""
     most = longest_change(stage)
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
@@ -121,10 +121,10 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class ChosenEnds:
-    """Ends of the steps of a stage: those that were `made` [s after its start], followed by a ladder.
+    """Ends of the steps of a stage: the steps `made` [s after its start], followed by the estimate `ladder`.
 
-    The stage ends at the first of `stops` [s]; a later one is the end of a longer run. Steps also end with each `part`
-    of a cycle [s], if that is not 0.
+    The stage ends at the first of `stops` [s]; a second one is the end of a run that continues the stage. Steps also
+    end with each `part` of a cycle [s], if it is not 0.
     """
 
     made: Sequence[float]
@@ -146,14 +146,14 @@ class ChosenEnds:
         return len(self.made) + self.ladder.count
 
     def elapsed(self, index: int) -> float:
-        """Return the end of the step [s after the start of the stage]."""
+        """Return the end of step `index` [s after the start of the stage]."""
         if index <= len(self.made):
             return self.made[index - 1] if index > 0 else 0.0
         now = self.made[-1] if self.made else 0.0
         return self.stops[-1] if index >= self.count else now + self.ladder.end(index - len(self.made))
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return the length of the step [s], or of all steps since another one."""
+        """Return the length of step `index` [s], or of all steps after step `since`."""
         return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
 
     def __getitem__(self, index: int) -> float:
@@ -162,8 +162,8 @@ class ChosenEnds:
 
 
 class MadeStep(NamedTuple):
-    """An accepted step that a stage has chosen: its stage, its end [s after the start of the stage], and the length of
-    the next one [s]."""
+    """An accepted step of a stage that chooses its steps: number of the stage, end of the step [s after the start of
+    the stage], and length of the next step [s]."""
 
     stage: int
     end: float
@@ -172,8 +172,8 @@ class MadeStep(NamedTuple):
 
 @dataclass
 class ChosenSteps:
-    """The steps that the stages of a history have chosen so far: their `ends` [s after the start of the stage] by the
-    number of the stage, and the length of the `next` one [s], 0 if undecided. None slides by more than `cells`."""
+    """The steps that stages have chosen so far: `ends` [s after the start of the stage] by the number of the stage, and
+    the length of the `next` step [s], 0 if undecided. No step slides by more than `cells`."""
 
     cells: int = 1
     ends: dict[int, list[float]] = field(default_factory=dict)
@@ -181,7 +181,7 @@ class ChosenSteps:
 
     @classmethod
     def from_job(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
-        """Return the steps of a job, with those chosen when a checkpoint with the arrays `saved` was written."""
+        """Return the chosen steps of a job, including the steps in the arrays `saved` of a checkpoint."""
         found = cls(most_cells(job))
         if saved is not None and "ends" in saved:
             ends = iter(saved["ends"].tolist())
@@ -211,7 +211,7 @@ class ChosenSteps:
         return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits, part)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
-        """Return all data with units, by their names in checkpoints."""
+        """Return all data of the chosen steps with units, by their names in checkpoints."""
         stages = sorted(self.ends)
         return {
             "stages": ([float(stage) for stage in stages], "1"),
@@ -240,7 +240,7 @@ def describe_steps(job: Planned) -> str:
 class GivenEnds:
     """Ends of `count` steps as fractions of a stage of `seconds`, each `growth` times as long as the one before.
 
-    The last is 1; further steps have the length of the last one.
+    The last fraction is 1; further steps have the length of the last one.
     """
 
     count: int
@@ -261,11 +261,11 @@ class GivenEnds:
         return 1.0 - self[self.count - 1]
 
     def elapsed(self, index: int) -> float:
-        """Return the end of the step [s after the start of the stage]."""
+        """Return the end of step `index` [s after the start of the stage]."""
         return self[index] * self.seconds if index else 0.0
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return the length of the step [s], or of all steps since another one; equal steps are exactly equal."""
+        """Return the length of step `index` [s], or of all steps after step `since`; equal steps are exactly equal."""
         if since is None and self.growth == 1.0:
             return self.seconds / self.count
         return (self[index] - self[index - 1 if since is None else since]) * self.seconds
@@ -280,9 +280,9 @@ class GivenEnds:
 
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
-    """Return the steps of a stage: none exceeds the requested length, and an instantaneous stage has none. Automatic
-    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp. Cycles of
-    an oscillation consist of equal steps, which also end at both turns."""
+    """Return the steps of a stage: no step exceeds the requested length, and an instantaneous stage has none. Automatic
+    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp. Cycles of an
+    oscillation consist of equal steps, which also end at both turns."""
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)
     if stage.cycles is not None and not isinstance(stage.time_step, GeometricStep):
@@ -312,9 +312,8 @@ class Step(NamedTuple):
 
     `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt of
     the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that this one
-    replaces. `decide`, for a step that may be too long, gets the error of the step and the motion of the edge of an
-    contact that attracts, in half process zones; it returns the shorter step to make instead, or the record of
-    this one.
+    replaces. `decide`, for a step that may be too long, takes the error of the step and the motion of the edge of a
+    contact that attracts, in half process zones; it returns a shorter step to make instead, or the record of this step.
     """
 
     number: int
@@ -336,10 +335,10 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Span:
-    """The steps of one stage: after the first `before` of the history one jump or none, and `count` steps with a
-    duration.
+    """The steps of one stage: a jump if `jumps`, and `count` steps with a duration, after `before` steps of the
+    history.
 
-    They start at `start` [s], with the surface at `origin` [m].
+    The stage starts at `start` [s], with the surface at `origin` [m].
     """
 
     index: int
@@ -374,26 +373,26 @@ class Span:
         return self.ends.interval(1), self.ends.interval(self.count)
 
     def time(self, index: int) -> float:
-        """Return the end [s] of step `index` of those with a duration."""
+        """Return the end [s] of step `index`, counted among the steps with a duration."""
         return self.start + self.ends.elapsed(index)
 
     def position(self, index: int) -> tuple[float, float]:
-        """Return the position of the surface at this end [m]."""
+        """Return the position of the surface [m] at the end of step `index`, counted as in `time`."""
         slid = self.stage.moving(self.ends.elapsed(index))
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
     def place(self, number: int) -> int:
-        """Return the index of the step `number` among those with a duration; 0 is the jump."""
+        """Return the index of step `number` of the history among the stage's steps with a duration; 0 is the jump."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
-        """Return the steps from one number to another as one."""
+        """Return one step that replaces the steps from `number` to `target`."""
         dt = self.ends.interval(self.place(target), since=self.place(number) - 1)
         return self.step(target)._replace(dt=dt, growth=0.0, passed=target - number)
 
     def step(self, number: int) -> Step:
-        """Return the step of this number of the history."""
+        """Return the step with this number in the history."""
         index, stage = self.place(number), self.stage
         if index == 0:
             facts = self.origin, stage.velocity, stage.control
@@ -417,11 +416,11 @@ class Timeline:
     """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are stored, not their steps.
 
     If the history ends before `until`, its last stage continues with its last time step, velocity and load, to the
-    first step that reaches it; a stage of a single solve cannot continue. `pressure` [Pa] belongs to the initial
+    first step that reaches `until`; a stage of a single solve cannot continue. `pressure` [Pa] belongs to the initial
     state, None at rest.
 
     `chosen` has the steps of stages that choose their own, and grows during a run; further steps are estimated. If
-    it is None, these stages have the steps of a body without memory.
+    `chosen` is None, these stages have the steps of a body without memory.
     """
 
     def __init__(
@@ -441,13 +440,13 @@ class Timeline:
     @classmethod
     def from_job(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
         """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end. `chosen`
-        are the steps that stages have chosen so far; further ones are estimated."""
+        has the steps that stages have chosen so far; further steps are estimated."""
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 
     @property
     def spans(self) -> list[Span]:
-        """The steps of each stage, with those chosen so far."""
+        """The steps of each stage, including the steps chosen so far."""
         chosen = self.chosen.count if self.chosen is not None else 0
         if chosen != self._seen:
             del self._spans[self._open :]
@@ -473,7 +472,7 @@ class Timeline:
         return Span(index, stage, number, _jumps(stage, before), count, ends, time, position)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
-        """Return this timeline with the steps that an earlier run chose: their times [s] by their numbers."""
+        """Return this timeline with the steps that an earlier run chose: the ends of its steps [s] by step number."""
         for index in range(len(self.history)):
             span = self.spans[index]
             if self.chosen is None or not isinstance(span.ends, ChosenEnds):
@@ -507,7 +506,7 @@ class Timeline:
         return (self[later] for later in range(number + 1, len(self) + 1))
 
     def span(self, number: int) -> Span:
-        """Return the span that holds a step."""
+        """Return the stage with its steps that holds the step `number`."""
         return self.spans[bisect_left(self.spans, number, key=lambda span: span.last)]
 
     @property
@@ -530,12 +529,12 @@ class Timeline:
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """Return how many of the first steps agree with those of another history, stage by stage."""
+        """Return the number of first steps that agree with another history, stage by stage."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 
     def first_between_cells(self) -> Step | None:
-        """Return the first step after which the displacement of the surface is not of whole cells along x."""
+        """Return the first step after which the surface is not displaced by whole cells along x, or None."""
         for span in filter(lambda span: span.moves, self.spans):
             first = span.before + span.jumps + 1
             if isinstance(span.ends, ChosenEnds):

@@ -30,13 +30,13 @@ def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
 
 
 def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
-    """Refuse `what` in a box that is free along y only, which has no kernel for it."""
+    """Yield an error about `what` in a box that is free along y only, for which no kernel exists."""
     if any(grid.cyclic) and not all(grid.cyclic):
         yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
 
 def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-    """Check that a box that is free along y only has no layer and no steady sliding."""
+    """Yield an error if a box that is free along y only has a layer or steady sliding."""
     asked = {"a layer (body)": body is not None, "steady sliding": steady is not None or initial.state == "steady"}
     for what in (what for what, given in asked.items() if given):
         yield from no_strip(what, grid)
@@ -52,7 +52,7 @@ def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
 
 
 def layer_is_in_proportion(grid: Grid, body: Body | None) -> Iterator[Fault]:
-    """Check that a layer is not so thin that its compliance underflows."""
+    """Yield an error if a layer is so thin that its compliance underflows."""
     if body is not None and body.thickness < THINNEST * max(grid.size):
         sentence = (
             f"must be at least {THINNEST:g} of the box, {THINNEST * max(grid.size):.3g} m, got {body.thickness:g}"
@@ -71,7 +71,7 @@ def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
 
 
 def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
-    """Check that no wave is shorter than two cells (Nyquist), and that the shortest one fits into the box."""
+    """Yield errors for waves shorter than two cells (Nyquist), and for a shortest wave longer than the box."""
     if bands is not None:
         return
     steps = zip((grid.dx, grid.dy), grid.size, "xy", grid.points, strict=True)
@@ -98,7 +98,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
 
 
 def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
-    """Check that the surface of a job with bands has a spectrum, after at most one measured map, and saves no maps."""
+    """Yield an error unless a surface in bands has a spectrum, after one measured map at most, and no maps are
+    saved."""
     if bands is None:
         return
     for index, shape in enumerate(surface):
@@ -120,7 +121,7 @@ def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, outpu
 def study_fits(
     study: Study | None, grid: Grid, surface: tuple[Any, ...], history: tuple[Stage, ...]
 ) -> Iterator[Fault]:
-    """Check that a study has a history to compare, and whole numbers of points on all its meshes."""
+    """Yield an error unless a study has a history to compare, and whole numbers of points on all its meshes."""
     if study is None:
         return
     if not history:
@@ -147,7 +148,7 @@ no_field = {name: partial(_refuse_field, name) for name in FIELDS_NEED}  # check
 
 
 def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Refuse rolling in a job without `interface`; with it this rule does not hold."""
+    """Yield an error for rolling in a job without `interface`; the effect `interface` lifts this rule."""
     for index, stage in enumerate(history):
         if stage is not None and stage.rolls:
             sentence = "needs interface: {stick: true}: without it all that touches slides"
@@ -171,7 +172,7 @@ def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
 
 
 def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Check that no load is tensile; the effect `adhesion` lifts this rule."""
+    """Yield an error for a tensile load; the effect `adhesion` lifts this rule."""
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
@@ -193,7 +194,7 @@ def _place_of_lowest(stage: Stage) -> tuple[str, ...]:
 
 
 def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
-    """Check that the shift of the material reaches the temperatures of steady states."""
+    """Yield an error if the shift of the material does not reach the temperatures of steady states."""
     for temperature in (steady.temperatures if steady else None) or ():
         try:
             heated(material, temperature)
@@ -205,10 +206,10 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
 def steady_bodies_do_not_flow(
     grid: Grid, material: AnyMaterial, body: Body | None, initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Check that a body without long-term modulus has a steady state.
+    """Yield an error if a body without long-term modulus has no steady state.
 
-    It flows at waves that do not vary along the sliding, so it has one only on a periodic line of points in the sliding
-    direction.
+    Such a body flows under waves that do not vary along the sliding, so that it has a steady state only on a periodic
+    line of points in the sliding direction.
     """
     if material.fitted.long_modulus > 0.0:
         return
@@ -222,7 +223,7 @@ def steady_bodies_do_not_flow(
 
 
 def energies_are_of_steps(history: tuple[Stage, ...], output: Output) -> Iterator[Fault]:
-    """Check that a job with energies has a history."""
+    """Yield an error if a job with energies has no history."""
     if output.energy and not history:
         yield Fault("needs a history: a friction curve has no work and no stored energy", ("output", "energy"))
 
@@ -233,7 +234,7 @@ def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Check that arrays have the shape of the grid, and coordinates, if any, its cells."""
+    """Yield an error unless arrays have the shape of the grid, and coordinates, if any, its cells."""
     for index, shape in enumerate(surface):
         if not isinstance(shape, HeightArray):
             continue
@@ -255,7 +256,7 @@ def loads_are_borne(
     steady: Steady | None,
     bands: Any,
 ) -> Iterator[Fault]:
-    """Check that mean pressures are below the hardness, and that there are no bands and no steady sliding with it."""
+    """Yield errors for mean pressures that reach the hardness, and for bands or steady sliding with a hardness."""
     hardness = material.hardness
     if hardness is None:
         return
@@ -287,7 +288,7 @@ def refuse_steady(section: str) -> Rule:
 
 
 def refuse_bands_over_time(section: str) -> Rule:
-    """Return the rule that excludes bands with a history for a section whose effect is not marched in bands."""
+    """Return the rule that excludes bands with a history for a section whose effect does not work in such bands."""
 
     def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         if given is not None and bands is not None and history:
@@ -300,7 +301,7 @@ def refuse_bands_over_time(section: str) -> Rule:
 
 
 def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Check that the history has at most MOST_STEPS steps."""
+    """Yield an error if the history has more than MOST_STEPS steps."""
     total = 0.0
     for index, stage in enumerate(history):
         if stage is None:

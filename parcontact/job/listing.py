@@ -1,8 +1,8 @@
-"""All sections of a job, also those that effects add, and the resolved job as plain data: for YAML, for comparison with
-other jobs, and as a table with units.
+"""All sections of a job, including sections of effects, and the job with all defaults as plain data: for YAML, for
+comparison with other jobs, and as a table with units.
 
-An effect of this package is found by its folder (`capabilities`). One of another package is registered under the name
-of its section by an entry point that names its class (`effects.effect`):
+An effect of this package is found by its folder (`capabilities`). An effect of another package is registered under the
+name of its section, by an entry point that names its class (`effects.effect`):
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
@@ -35,7 +35,7 @@ MOST_BRANCHES = 6  # largest number of branches that a table shows; of more it s
 
 
 def plain_data(value: Any) -> Any:
-    """Return a value of a job as plain data; keys without a value and keys chosen by the accuracy are left out."""
+    """Return a value of a job as plain data, without keys that have no value or that the accuracy chose."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
@@ -55,7 +55,7 @@ def plain_data(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """Return the keys of a part that have a value, with their values; parts as the job gives them."""
+    """Return the keys of a part that have a value, with their values, where parts are as the job gives them."""
     names = (name for name in type(part).model_fields if name not in part.left_out())
     found = ((name, value) for name in names if (value := getattr(part, name)) is not None)
     return ((name, value.given if isinstance(value, Part) else value) for name, value in found)
@@ -84,7 +84,7 @@ def unit(kind: type[Part], key: str) -> str:
 
 
 def unit_of_path(path: str) -> str:
-    """Return the unit of a key of a job such as history.1.velocity, if all keys of this name have the same; else ''."""
+    """Return the unit of a key such as history.1.velocity if all keys of this name have the same unit; else ''."""
     units = _units().get(path.split(".")[-1], set())
     return next(iter(units)) if len(units) == 1 else ""
 
@@ -176,7 +176,7 @@ def find_effects() -> dict[str, Any]:
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """Return the effects registered for some sections, by section, in the order in which they follow a step. Raises
+    """Return the effects registered for some sections, by section, in the order in which they act after a step. Raises
     ValidationError for an unusable effect."""
     found = [section for section in sections if section in _registered()]
     for section in found:
@@ -188,8 +188,8 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 
 def answers(module: str, name: str) -> list[Any]:
-    """Return the object called `name` of each capability that has one: of this package in its module `module`, of
-    another package in the class of its effect."""
+    """Return the object called `name` of each effect that has one: in the `module` of an effect of this package, or in
+    the class of another package's effect."""
     others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
     found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
     return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
@@ -259,7 +259,7 @@ def _load(section: str) -> Any:
 
 @cache
 def why_unusable(section: str) -> str:
-    """Return why the effect of a section cannot be used; '' if it can."""
+    """Return the reason why the effect of a section cannot be used; '' if it can."""
     try:
         effect = _load(section)
         base = f"{Part.__module__}.{Part.__name__}"

@@ -1,4 +1,4 @@
-"""Memory and disk that a job needs at least, compared with this machine."""
+"""Least memory and disk space that a job needs, compared with this machine."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def doubt_memory(grid: Grid) -> Iterator[Doubt]:
 
 
 def machines() -> int:
-    """Return the number of machines of this program, from the environment variables of its launcher."""
+    """Return the number of machines on which this program runs, from the environment variables of its launcher."""
 
     def number(name: str) -> int:
         text = os.environ.get(name, "")

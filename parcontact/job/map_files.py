@@ -1,8 +1,9 @@
-"""Read measured maps and line scans. Each format has one reader, whatever is installed.
+"""Reading of measured maps and line scans. Each format has one reader, whatever is installed.
 
-Arrays (`.npy`, `.h5`, `.mat`) and texts of numbers are read here; formats of instruments, and texts whose header gives
-the size or the unit as instruments write them, by SurfaceTopography. Heights point up, out of the road: the highest
-points touch first."""
+Arrays (`.npy`, `.h5`, `.mat`) and texts of numbers are read here. SurfaceTopography reads formats of instruments, and
+texts in whose header an instrument has written the size or the unit. Heights point up, out of the road: the highest
+points touch first.
+"""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -47,7 +48,7 @@ class Map:
 @dataclass(frozen=True)
 class MapContents:
     """Heights in a file, shape (ny, nx) or (nx,), with their unit [m], the size of the map along x and y (or of the
-    line), and the unit of the size [m], as far as the file gives them."""
+    line), and the unit of this size [m]; None for what the file does not state."""
 
     values: Array
     unit: float | None = None
@@ -56,7 +57,8 @@ class MapContents:
 
 
 def read_map(part: Topography) -> Map:
-    """Read a map. The job must give units and size if the file does not, and must not otherwise. Raises InputError."""
+    """Return the map in a file. The job must give units and size if and only if the file does not. Raises
+    InputError."""
     path = part.path
     try:
         if not path.is_file():

@@ -1,4 +1,4 @@
-"""The `material` section: an elastic or a generalized Zener body (paper, Eq. 8 and its state variables)."""
+"""The `material` section: an elastic body, a generalized Zener body (paper, Eq. 8), or measured moduli."""
 
 from __future__ import annotations
 
@@ -59,24 +59,24 @@ class PronyBranch(Part):
 
     @property
     def instant_modulus(self) -> float:
-        """Return the instantaneous modulus [Pa]."""
+        """Return the instantaneous modulus of the term [Pa]."""
         return self.modulus
 
     @property
     def long_modulus(self) -> float:
-        """Return the long-term modulus, 0 [Pa]."""
+        """Return the long-term modulus of the term, which is 0 [Pa]."""
         return 0.0
 
 
 class FractionBranch(Part):
-    """A term of a Prony series as in finite-element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
+    """A term of a Prony series as in finite element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
 
     label: ClassVar[str] = "a branch of the form g, tau"
     g: Number = Field(ge=0, le=1, description="a fraction of modulus_0 [-] from 0 to 1")
     tau: Positive = Field(description="a positive relaxation time [s]")
 
     def times(self, modulus: float) -> PronyBranch:
-        """Return the branch of a body with the instantaneous modulus `modulus` [Pa]."""
+        """Return the branch for a body with the instantaneous modulus `modulus` [Pa]."""
         return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
 
 
@@ -179,9 +179,9 @@ def _stiff(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranc
 class Zener(Part):
     """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
 
-    The body is a fluid if the long-term modulus is zero. With a `shift` relaxation times and moduli are given at its
+    The body is a fluid if the long-term modulus is zero. With a `shift`, relaxation times and moduli are given at its
     reference temperature; at another `temperature` times are multiplied by a_T and moduli by b_T. With the
-    instantaneous modulus `modulus_0`, branches are fractions of it.
+    instantaneous modulus `modulus_0`, branches are fractions of this modulus.
     """
 
     model: Literal["zener"] = "zener"
@@ -222,14 +222,14 @@ class Zener(Part):
 
     @property
     def time_factor(self) -> float:
-        """Return a_T, the ratio of relaxation times at the temperature to those at the reference [-]."""
+        """Return a_T [-], the ratio of relaxation times at the temperature to those at the reference temperature."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** self.shift.made.log_factor(self.temperature))
 
     @property
     def modulus_factor(self) -> float:
-        """Return b_T, the ratio of moduli at the temperature to those at the reference [-]."""
+        """Return b_T [-], the ratio of moduli at the body's temperature to those at the reference temperature."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** log_vertical(self.shift.made, self.temperature))
@@ -245,12 +245,12 @@ class Zener(Part):
         return self.modulus_factor * (self.modulus_inf + sum(branch.long_modulus for branch in self.branches))
 
     def at(self, temperature: float) -> Zener:
-        """Return the body at another temperature [deg C], which its shift must reach."""
+        """Return the body at another temperature [deg C], which must be in the range of its shift."""
         return self.model_copy(update={"temperature": temperature})
 
 
 class Dma(Part):
-    """A material fitted to a table of measured moduli when the job is read, as by `parcontact fit`."""
+    """A material fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
 
     model: Literal["dma"] = "dma"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
@@ -285,12 +285,12 @@ class Dma(Part):
 
     @property
     def fitted(self) -> Zener:
-        """Return the material as springs and Maxwell branches."""
+        """Return the fitted material, with springs and Maxwell branches."""
         return self._fitted
 
 
 def describe_temperature(material: Elastic | Zener | Dma, section: str = "material") -> str:
-    """Return a sentence on the temperature of the material of a section, '' for a material without a shift."""
+    """Return a sentence on the temperature of the material in a section; '' for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener) or body.shift is None:
         return ""
@@ -303,7 +303,7 @@ def describe_temperature(material: Elastic | Zener | Dma, section: str = "materi
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
-    """Return a material at another temperature [deg C]. Raises InputError for a material without a shift."""
+    """Return the material at another temperature [deg C]. Raises InputError for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")

@@ -1,8 +1,8 @@
-"""Warnings about a job, before it runs.
+"""Warnings about the physics of a job, before it runs.
 
-They are about jobs outside of the theory, a linear half space with small slopes and strains, and about the thickness of
-a layer, compared with the surface, the mesh and the material. Slopes, heights, pressures and radii are bounded from
-below, so that sound jobs get no warning.
+The warnings concern jobs outside of the theory, a linear half space with small slopes and strains, and the thickness of
+a layer, compared with the surface, the mesh and the material. Slopes, heights, pressures and radii are lower bounds, so
+that sound jobs get no warning.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ WARN_STEEP = Kind(
 
 
 def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
-    """Yield a warning about an rms slope above STEEP, with the keys that heights of files may lack."""
+    """Yield a warning about an rms slope above STEEP; it names the keys that may be missing for heights from files."""
     if slope > STEEP:
         yield WARN_STEEP("surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
 
@@ -76,7 +76,7 @@ READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read f
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:
-    """Return True if the rms slope of a surface follows from the job without its heights."""
+    """Return True if the rms slope of a surface follows from the job without reading heights."""
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
@@ -189,7 +189,7 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
-    """Return an upper bound of pressure over strain after a constant pressure for `seconds`, as E* [Pa].
+    """Return an upper bound of pressure divided by strain, as E* [Pa], after a constant pressure for `seconds`.
 
     The bound is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t with rising creep compliance J, so
     J(t) >= t/int_0^t E*.
@@ -345,7 +345,7 @@ def _final(stage: Stage) -> float:
 
 
 def neighbours(job: Sections) -> Iterator[Doubt]:
-    """Yield a warning if images change the load of a single sphere in a periodic box."""
+    """Yield a warning if the images of a single sphere in a periodic box change its load."""
     modulus = instant_contact_modulus(job.material.fitted)
     return acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
@@ -360,7 +360,7 @@ WARN_IMAGES = Kind(
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
-    """Yield a warning if periodic images of the contact change the load of a single sphere by more than ALONE.
+    """Yield a warning if the periodic images of a single sphere change its load by more than ALONE.
 
     `contact` maps the radius R of the sphere [m] to the Hertzian radius of contact a [m]. An image at the distance r
     with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact radius changes by

@@ -1,10 +1,10 @@
-"""Measured maps: files, preparation and spectrum.
+"""Measured maps as heights of a box on a grid, and measured spectra.
 
-A measured map as the heights of a box on a grid: read, cut to the box, treated, resampled.
+A measured map is read, cut to the box, treated (levelled, filled, made periodic), and resampled.
 
-Treat a measured map: level, fill, make periodic, resample. Maps have the shape (ny, nx); missing points are NaN.
+Maps have the shape (ny, nx); missing points are NaN.
 
-Measured isotropic spectra: a table of C1D or C2D over wavenumbers, and the density of waves that follows from it.
+A measured isotropic spectrum is a table of C1D or C2D at wavenumbers q, from which the density of waves follows.
 
 The columns are `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, or the same in mm, um or nm. As in `physics.surface_statistics`,
 q = 2 pi/wavelength, and C1D is the one-sided spectrum of profiles:
@@ -15,8 +15,8 @@ q = 2 pi/wavelength, and C1D is the one-sided spectrum of profiles:
 SurfaceTopography and contact.engineering write pi C1D and 4 pi^2 C2D (T. D. B. Jacobs, T. Junge, L. Pastewka, Surf.
 Topogr.: Metrol. Prop. 5 (2017) 013001): `normalisation: surface_topography` divides by these factors.
 
-Between its points a spectrum is a power law. For Abel's integral, C1D is extrapolated beyond its last point as
-q^-(1 + 2 hurst) with the given Hurst exponent, or else by the power law of its last decade.
+Between its points a spectrum is a power law. For Abel's integral, C1D is extrapolated beyond the last point as q^-(1 +
+2 hurst) with the given Hurst exponent, or else by the power law of the last decade.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # number of terms of 
 
 @dataclass(frozen=True)
 class Treated:
-    """A map without missing points, how many were `missing`, and which are `outliers`."""
+    """A map without missing points, the number of points that were `missing`, and a mask of `outliers`."""
 
     heights: Array
     missing: int
@@ -47,8 +47,8 @@ class Treated:
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
-    """Level and fill a map, optionally clip outliers, and make it periodic by `smooth`, by `mirror` (doubles its length
-    along both directions) or not (`none`)."""
+    """Return a map that is levelled, filled, without outliers if `clip`, and made periodic by `smooth`, by `mirror`
+    (which doubles both lengths) or not (`none`)."""
     known = np.isfinite(heights)
     filled = fill(remove_trend(heights, known, detrend), known)
     odd, around = find_outliers(filled)
@@ -62,7 +62,7 @@ def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Tr
 
 
 def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Array:
-    """Return a map without its mean, plane or paraboloid, by least squares over known points."""
+    """Return a map minus its mean, plane or paraboloid, fitted by least squares to known points."""
     y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in heights.shape), indexing="ij")
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[: TERMS[detrend]]
     trend = np.linalg.lstsq(terms[:, known].T, heights[known], rcond=None)[0]
@@ -70,8 +70,8 @@ def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Arra
 
 
 def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
-    """Fill missing points by the harmonic surface through their neighbours, relaxed from the nearest known height in
-    about n^2 sweeps for a hole n points wide."""
+    """Return a map whose missing points are filled by a harmonic surface through the known points around them, relaxed
+    from the nearest known height in about n^2 sweeps for a hole n points wide."""
     if known.all():
         return heights
     depth, nearest = scipy.ndimage.distance_transform_edt(~known, return_indices=True)
@@ -82,8 +82,8 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return the mask of points that differ from the median of their neighbours by more than OUTLIER median deviations,
-    and these medians; beyond the edges slopes are extrapolated."""
+    """Return a mask of the points that differ from the median of their neighbours by more than OUTLIER median
+    deviations, and the map of these medians; beyond the edges slopes are extrapolated."""
     around = scipy.ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
     typical = float(np.median(deviation[deviation > 0.0])) if deviation.any() else np.inf
@@ -103,8 +103,8 @@ def is_periodic(heights: Array) -> bool:
 def make_periodic(heights: Array) -> Array:
     """Return the map minus the smoothest map with the same jumps across its edges.
 
-    This harmonic part is large at the edges only, so slopes inside stay (L. Moisan, J. Math. Imaging Vis. 39 (2011)
-    161).
+    This harmonic part is large only at the edges, so that slopes inside hardly change (L. Moisan, J. Math. Imaging Vis.
+    39 (2011) 161).
     """
     jumps = np.zeros_like(heights)
     for edges, rows in ((jumps, heights), (jumps.T, heights.T)):
@@ -145,8 +145,11 @@ SLACK = 1e-6  # rounding: relative excess of the box over the map that is ignore
 
 @dataclass(frozen=True)
 class Prepared:
-    """Heights [m] on the grid, shape (ny, nx), of zero mean; the section of the job, the whole map, and the part of the
-    map in the box as cut and as treated, with its size [m]."""
+    """A measured map prepared for a box: heights [m] on the grid, shape (ny, nx), of zero mean.
+
+    Also the section of the job, the whole map, and the part of the map in the box, as cut and as treated, with its size
+    [m].
+    """
 
     heights: Array
     part: Topography
@@ -215,8 +218,8 @@ FORMS = "q[1/m] C2D[m^4] or q[1/m] C1D[m^3] (or mm, um, nm)"
 
 @dataclass(frozen=True)
 class MeasuredSpectrum:
-    """An isotropic spectrum Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond the last one it falls as
-    q^-`fall`, or is 0 if `fall` is 0."""
+    """An isotropic spectrum Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond the last wavenumber Phi
+    falls as q^-`fall`, or is 0 if `fall` is 0."""
 
     q: Array
     phi: Array
@@ -254,7 +257,7 @@ def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, f
 def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """Return the spectrum of an isotropic surface from a line scan, and its longest and shortest wavelengths [m].
 
-    C1D of the levelled scan is taken with Hann's window, and averaged in BINS bins per decade. Raises InputError.
+    C1D of the levelled scan is computed with Hann's window, and averaged in BINS bins per decade. Raises InputError.
     """
     heights, length = line.heights, line.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):

@@ -29,7 +29,7 @@ NO_GRID = {"points": 1, "size": 1.0}  # grid of a job with bands, which have the
 
 
 class Job(Part):
-    """A whole job, whose sections are named as in the job file. Jobs are equal if all their keys are equal."""
+    """A whole job; its sections have the same names as in the job file. Jobs are equal if all their keys are equal."""
 
     title: str = Field(default="", description="text (put numbers in quotes)")
     grid: Grid = Field(description="a mapping with points and size")
@@ -53,7 +53,8 @@ class Job(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Number unnamed stages, choose the kernel by the boundary, and name the output after the job file."""
+        """Return `data` with names of all stages, the kernel for the boundary, and an output directory by the file's
+        name."""
         data = prepared(data)
         if data.get("bands") is not None:
             data.setdefault("grid", dict(NO_GRID))
@@ -107,12 +108,12 @@ class Job(Part):
 
     @property
     def included(self) -> str:
-        """Return a line for each file of an included material."""
+        """Return a text with a line for each file of an included material."""
         return "\n".join(map(str, self._origin.included))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Return the sentences of `doubts`."""
+        """Return all warnings about the job as sentences."""
         return tuple(map(str, self.doubts))
 
     @property
@@ -128,7 +129,7 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """Return sentences on the temperature of the material, and on what the sections of effects mean in this job."""
+        """Return sentences on the temperature of the material, and on the meaning of effects' sections in this job."""
         material: Any = self.material.given
         return tuple(filter(None, (describe_temperature(material), *self._said("facts"))))
 
@@ -179,7 +180,7 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Return True if the result depends on the history: by a body that relaxes, or by an effect."""
+        """Return True if the result depends on the history, because the body relaxes or an effect has a memory."""
         return self.material.fitted.remembers or any(asked(self) for asked in self.asked("remembers"))
 
     @property
@@ -188,9 +189,9 @@ class Job(Part):
         return any(asked(self) for asked in self.asked("sheared_first"))
 
     def resolved(self) -> str:
-        """Return YAML text with every default, which loads back to an equal job.
+        """Return the job as YAML text with every default; loading the text returns an equal job.
 
-        Values that `numerics.accuracy` chose are in a comment only, so that it chooses them again.
+        Values that `numerics.accuracy` chose are comments, so that they are chosen again when the text is loaded.
         """
         chosen = ", ".join(f"{name} {value!r}" for name, value in self.numerics.chosen.items())
         return dump(listing.plain_data(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
@@ -201,9 +202,10 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 
 @cache
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
-    """Return the model of a job extended by the sections of effects, and by the keys that an effect adds to stages.
+    """Return the model of a job with the sections of effects, and with the keys that these effects add to stages.
 
-    A rule on the section of another effect applies only if the job has this section."""
+    A rule on the section of another effect applies only if the job has this section.
+    """
     effects = listing.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))

@@ -24,7 +24,7 @@ FIXED = ("sweep", "output.directory")  # keys that cannot be swept
 
 
 class Setting(NamedTuple):
-    """A value for a key, from a sweep, the command line or Python, with the places of both."""
+    """A value for a key, from a sweep, the command line or Python, with the places of key and value."""
 
     name: str
     value: Any
@@ -43,7 +43,7 @@ Axis = list[tuple[Setting, ...]]  # of one mapping: for each of its values, the 
 
 
 class Sweep:
-    """The mappings of a sweep; without a sweep there are none."""
+    """The mappings of a sweep; an empty list for a job without a sweep."""
 
     def __init__(self, axes: list[Axis], place: Place) -> None:
         self.axes, self.place = axes, place
@@ -157,7 +157,7 @@ Changes = Iterable[str | tuple[str, Any]]  # `key.path=value`, or a key and Pyth
 def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None = None) -> Reading:
     """Return the data of a job with its overrides, the settings of a case of its sweep, and the included material.
 
-    `given` data are used in place of the file.
+    If `given`, this source replaces the file.
     """
     source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]
@@ -247,7 +247,7 @@ def _dead_end(node: Any, shown: str, name: str) -> str:
 
 
 def materials() -> list[str]:
-    """Return the sections that are materials."""
+    """Return the names of the sections that are materials."""
     return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
 
 

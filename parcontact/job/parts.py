@@ -35,8 +35,8 @@ class Origin(NamedTuple):
     `approaches` are the places of the approaches of the stages, `strict` is the place of `numerics.strict` ('' for jobs
     from Python).
 
-    `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them. `names_directory`: the
-    job gives its output directory.
+    `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them as texts.
+    `names_directory`: the job gives its output directory.
     """
 
     path: Path = Path("job.yaml")
@@ -50,7 +50,7 @@ class Origin(NamedTuple):
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
-    """Return the absolute path of a file that a job names; relative ones start at the job file."""
+    """Return the absolute path of a file that a job names; relative paths start at the job file."""
     found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
     if not found.is_file():
         refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
@@ -70,7 +70,7 @@ def rules_of(*checks: Callable[..., Iterator[Fault]]) -> tuple[Rule, ...]:
 
 
 class Instead(NamedTuple):
-    """Advice for an unknown key, and the keys that are possibly meant."""
+    """Advice for an unknown key, and the keys that are probably meant."""
 
     advice: str
     keys: tuple[str, ...] = ()
@@ -94,7 +94,7 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return the part as the job gives it; another one if effects changed it."""
+        """Return the part as the job gives it; effects may have replaced it by this part."""
         return self
 
     def left_out(self) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Part(BaseModel):
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """Return the keys as they are written in a job."""
+        """Return the keys of the part as they are written in a job."""
         return tuple(cls.model_fields)
 
     @model_validator(mode="wrap")
@@ -239,7 +239,7 @@ def literal_words(annotation: Any) -> tuple[str, ...]:
 def chosen(
     key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
 ) -> Callable[[Any, ValidationInfo], Any]:
-    """Return a validator that takes the kind of a part from its `key`; `called` are other names of kinds."""
+    """Return a validator that chooses the kind of a part by its `key`; `called` are other names of kinds."""
 
     def choose(data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, tuple(kinds.values())):

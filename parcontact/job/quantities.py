@@ -41,7 +41,7 @@ def both(value: Any) -> Any:
 
 
 def along_x(value: Any) -> Any:
-    """Return a vector; a number is its x component."""
+    """Return a vector; a single number is its x component."""
     return value if isinstance(value, list | tuple) else (value, 0.0)
 
 
@@ -69,7 +69,7 @@ def from_home(path: Path) -> Path:
 def log_range(text: str) -> tuple[float, ...]:
     """Return n positive numbers from a to b, equally spaced in the logarithm, from a text `a:b:n`.
 
-    Raises ValueError with the end of the sentence "... must be ...".
+    Raises ValueError with the end of a sentence "KEY must be ...".
     """
     try:
         first, last, count = text.split(":")
@@ -86,7 +86,7 @@ def log_range(text: str) -> tuple[float, ...]:
 
 
 def bounded(value: float) -> float:
-    """Refuse numbers that would overflow in a run, in squares of slopes and strains or quotients of lengths."""
+    """Return a number; refuse one that would overflow in a run, in squares of slopes or quotients of lengths."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         refuse(Fault(f"must be zero, or from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value

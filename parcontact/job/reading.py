@@ -1,6 +1,6 @@
 """Reading of job files: one job, or the cases of a sweep; mistakes are reported with file, line and column.
 
-Reading of the resolved job in an output directory, as far as pictures and texts need it.
+The stored job of an output directory is read as far as pictures and texts need it.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ class Case(NamedTuple):
 
 
 def leave_grid(source: Source, origin: Origin) -> Origin:
-    """Leave words such as `points: auto` in the source, where they count as mistakes."""
+    """Return `origin` and leave words such as `points: auto` in the source, where they then count as mistakes."""
     return origin
 
 
 def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill_grid: FillGrid = leave_grid) -> Job:
-    """Read a job file, or a mapping with the same keys, whose paths are relative to the working directory.
+    """Return the job in a job file, or in a mapping with the same keys, whose paths start at the working directory.
 
     `overrides` are texts like `grid.points=512`, or a mapping of such keys to values. `fill_grid` replaces words of the
     grid by numbers (see `mesh.load`). Raises JobError with all mistakes.
@@ -69,7 +69,8 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
 
 
 def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = leave_grid) -> tuple[Case, ...]:
-    """Read all cases of a job (one without a sweep), as `load`. A mistake names the first case that has it."""
+    """Return all cases of a job (one without a sweep), read as by `load`. A mistake names the first case that has
+    it."""
     first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if not sweep:
         if first is None:
@@ -200,7 +201,7 @@ FILES = ("file", "topography")  # shapes that come from files
 
 
 def shown_job(path: Path) -> Job:
-    """Return the resolved job with flat shapes in place of files, which may no longer exist."""
+    """Return the stored job of an output directory, with flat shapes in place of files, which may no longer exist."""
     try:
         text = path.read_bytes()
         data = yaml_text.parse(text, str(path)).data

@@ -135,7 +135,7 @@ class SectionSchema:
 
 
 def sections() -> list[SectionSchema]:
-    """Return all parts of a job in the order of the job, including the effects of this package."""
+    """Return all parts of a job in the order of the job, including the sections of this package's effects."""
     found: dict[type[Part], SectionSchema] = {Job: SectionSchema("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)

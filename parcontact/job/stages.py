@@ -1,6 +1,6 @@
-"""Loads and velocities of a stage that oscillate with one frequency, for whole cycles.
+"""The `initial`, `history` and `steady` sections: loads and velocities, also oscillating ones.
 
-The `initial`, `history` and `steady` sections: loads and velocities.
+Loads and velocities of a stage oscillate with one frequency, for whole cycles.
 """
 
 from __future__ import annotations
@@ -59,17 +59,17 @@ class Oscillation:
 
     @property
     def seconds(self) -> float:
-        """Return 0: the number of cycles is a key of the stage."""
+        """Return 0: the duration follows from the stage's number of cycles."""
         return 0.0
 
     def at(self, fraction: float, seconds: float) -> float:
-        """Return the load some `seconds` after the start of the stage; exact at both turns."""
+        """Return the load `seconds` after the start of the stage; exact at both turns."""
         phase = math.remainder(seconds * self.frequency, 1.0)
         return self.mean + self.amplitude * math.sin(2.0 * math.pi * phase)
 
 
 class Swing(tuple[float, float]):
-    """The amplitude (x, y) [m/s] of a velocity `amplitude cos(2 pi frequency t)`, with the time t from the start of its
+    """Amplitude (x, y) [m/s] of a velocity `amplitude cos(2 pi frequency t)`, with the time t from the start of its
     stage: the surface moves to and fro by `amplitude/(2 pi frequency)`."""
 
     frequency: float
@@ -89,7 +89,8 @@ class Swing(tuple[float, float]):
         return hash((*self, self.frequency))
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] in which the amplitude as a constant velocity leads to the same position."""
+        """Return the time [s] that the surface would need at the constant velocity `amplitude` to reach its position
+        after `seconds`."""
         turn = 2.0 * math.pi
         return math.sin(turn * math.remainder(seconds * self.frequency, 1.0)) / (turn * self.frequency)
 
@@ -113,7 +114,7 @@ OR_SWING = WrapValidator(_swing, json_schema_input_type=Vector | SwingKeys)  # o
 
 
 def check_cycles(cycles: int | None, velocity: tuple[float, float], *loads: Any) -> Iterator[Fault]:
-    """Check that a stage oscillates in one quantity, and has cycles if and only if it oscillates."""
+    """Yield errors unless a stage oscillates in one quantity at most, and has cycles exactly if it oscillates."""
     names = ("velocity", "pressure", "force", "approach")
     found = [
         name for name, value in zip(names, (velocity, *loads), strict=True) if isinstance(value, Swing | Oscillation)
@@ -315,7 +316,7 @@ class Stage(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Set `time_step: auto` for a stage with a duration that gives no steps."""
+        """Return `data` with `time_step: auto` for a stage with a duration that gives no steps."""
         approach, given = data.get("approach"), data.keys() & {"time_step", "cells_per_step"}
         moves = approach.get("velocity") if isinstance(approach, dict) else getattr(approach, "velocity", None)
         lasts = moves or data.keys() & {*LASTS}
@@ -330,7 +331,7 @@ class Stage(Part):
 
     @property
     def chooses(self) -> bool:
-        """Return True for `time_step: auto`."""
+        """Return True if the program chooses the steps of the stage (`time_step: auto`)."""
         return self.time_step == AUTO
 
     @property
@@ -362,7 +363,7 @@ class Stage(Part):
 
     @property
     def constant(self) -> bool:
-        """Return True if no load changes within the stage."""
+        """Return True if the load is constant within the stage."""
         return all(getattr(getattr(self, name), "constant", True) for name in type(self).model_fields)
 
     @property
@@ -371,7 +372,7 @@ class Stage(Part):
         return math.hypot(*self.velocity)
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] in which a surface with the constant `velocity` reaches the same position as after
+        """Return the time [s] that the surface would need at its constant `velocity` to reach its position after
         `seconds` of the stage."""
         return self.velocity.moving(seconds) if isinstance(self.velocity, Swing) else seconds
 
@@ -403,7 +404,7 @@ class Initial(Part):
 
 
 def expand_range(value: Any) -> Any:
-    """Return a list, or the numbers of a range first:last:count."""
+    """Return a list as it is, or the numbers of a range first:last:count."""
     if not isinstance(value, str):
         return listed(value)
     try:

@@ -1,6 +1,6 @@
 """The `surface` section: shapes whose heights add up to the rigid surface, z pointing into the body.
 
-Heights given as an array in Python. A stored job names a height file in its own directory instead.
+Heights may be an array in Python; a stored job names a height file in its own directory instead.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny,
 
 
 class GivenHeights:
-    """A read-only map of heights [m], shape (ny, nx). Only root has `values`: they are not sent with the job.
+    """A read-only map of heights [m], shape (ny, nx), from Python. Only root has `values`: jobs are sent without them.
 
     `cell` is the spacing [m] of points along x and y, NaN without coordinates.
     """
@@ -147,7 +147,7 @@ def _ordered(name: str, than: str) -> Rule:
 
 
 class Anisotropy(Part):
-    """Waves along `angle` are `ratio` times as long as waves of the same power across it."""
+    """Waves along `angle` are `ratio` times as long as waves of the same power across this direction."""
 
     ratio: Number = Field(ge=1, le=1e6, description="a number of 1 or more")
     angle: Real = Field(default=0.0, description="a finite angle [deg]")
@@ -156,8 +156,8 @@ class Anisotropy(Part):
 class Rough(Part):
     """Self-affine roughness with a roll-off, Eqs. (12)-(13) of the paper; scaled by one of rms slope, rms height or C.
 
-    Its power spectrum is constant between the long and the roll-off wavelength, falls as q^(-2(1 + hurst)) down to the
-    short one and is zero elsewhere. `amplitudes: fixed` puts all randomness into the phases.
+    The power spectrum is constant between the long and the roll-off wavelength, falls as q^(-2(1 + hurst)) down to the
+    short wavelength, and is zero elsewhere. `amplitudes: fixed` puts all randomness into the phases.
     """
 
     shape: Literal["rough"] = "rough"
@@ -177,8 +177,8 @@ class Rough(Part):
 
 
 class RoughSpectrum(Part):
-    """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or
-    `q[1/m] C1D[m^3]` of profiles. With `hurst` it is extrapolated to shorter waves as q^(-2 (1 + hurst)).
+    """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or `q[1/m]
+    C1D[m^3]` of profiles. With `hurst` the spectrum is extrapolated to shorter waves as q^(-2 (1 + hurst)).
 
     The default range of wavelengths is the range of the data.
     """
@@ -195,7 +195,7 @@ class RoughSpectrum(Part):
 
 
 class Sphere(Part):
-    """A sphere; `profile: paraboloid` is its parabola at the tip, as in Hertz's theory."""
+    """A sphere; `profile: paraboloid` takes the parabola at its tip, as in Hertz's theory."""
 
     shape: Literal["sphere"] = "sphere"
     radius: Radius
@@ -230,7 +230,7 @@ class Pyramid(Part):
 
 
 class Punch(Part):
-    """A round punch with a flat face of `radius`, around which it falls as a parabola with the radius `edge`."""
+    """A round punch with a flat face of `radius`; around the face the surface falls as a parabola of radius `edge`."""
 
     shape: Literal["punch"] = "punch"
     radius: Radius
@@ -255,7 +255,7 @@ def _surface_file(path: Path, info: ValidationInfo) -> Path:
 
 
 class HeightFile(Part):
-    """Heights from a file with the shape of the grid, times `scale`; `dataset` is their name in an HDF5 file."""
+    """Heights from a file with the shape of the grid, times `scale`; `dataset` names them in an HDF5 file."""
 
     shape: Literal["file"] = "file"
     path: Annotated[Path, AfterValidator(_surface_file), Field(description="the path of a .npy, .h5 or .txt file")]
@@ -310,7 +310,7 @@ class Topography(Part):
         return self.units.z if self.units else self.unit
 
     def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
-        """Return the size [m] that the job gives to a map with `points` along x and y, or None."""
+        """Return the size [m] that the job gives for a map with `points` along x and y; None if it gives none."""
         if self.pixel is None:
             return self.size
         return self.pixel[0] * points[0], self.pixel[1] * points[1]
@@ -354,8 +354,8 @@ Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnySha
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
-    shapes and files may have every wave from the box to two cells."""
+    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; an empty tuple for a flat surface.
+    Round shapes and files may have every wave from the box to two cells."""
     longest = 2.0 * math.pi / max(grid.size)
     cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
     if isinstance(shape, Flat):

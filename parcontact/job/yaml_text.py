@@ -1,15 +1,11 @@
-"""Text of a job, with the places of its values.
-
-YAML text as a `Source`: plain data with the places of all values and keys.
+"""Text of a job as plain data with the place of each value and key, for messages about mistakes.
 
 Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
 The size of a text and the number of its values after expansion of aliases are limited.
 
-Mistakes as predicates of sentences about a key, and their transport through pydantic.
+Mistakes are predicates of sentences about a key, which pydantic collects.
 
-Plain data with the place of each value in its file, for messages about mistakes.
-
-Jobs given as Python data instead of a file; messages about mistakes name the key.
+For jobs given as Python data instead of a file, messages about mistakes name the key.
 """
 
 from __future__ import annotations
@@ -32,7 +28,7 @@ Key = tuple[str | int, ...]  # the way to a value: ("history", 0, "pressure")
 
 
 class Place(NamedTuple):
-    """A place in a file; `line` is 0 if `origin` is the whole place, such as a command-line override."""
+    """A place in a file; `line` is 0 if `origin` alone is the place, such as a command-line override."""
 
     origin: str
     line: int = 0
@@ -78,7 +74,8 @@ class Located(NamedTuple):
 class Source:
     """The data of a file, of a mapping or of an override, with its place and its mistakes.
 
-    `places` has the places of key and value by path; other values have the place of the list or mapping around them.
+    `places` has the places of key and value by path; a value without an entry has the place of the list or mapping
+    around it.
     """
 
     data: Any = None
@@ -99,7 +96,7 @@ class Source:
         self.places[path] = key_place, place
 
     def locate(self, path: Key) -> Located:
-        """Follow a path; indices into a list that was given as a single value are ignored."""
+        """Return the places on a path through the data; indices into a list given as a single value are ignored."""
         node, place, key_place, steps = self.data, self.place, self.place, Key()
         for step in path:
             if isinstance(node, dict | list) and (step in node if isinstance(node, dict) else step in range(len(node))):
@@ -125,7 +122,7 @@ AT_VALUE, AT_KEY = "at value", "at key"  # types of this module's errors in pyda
 
 
 class Fault(NamedTuple):
-    """A mistake: the predicate of a sentence whose subject is a key, and the path to the key."""
+    """A mistake in a job: the predicate of a sentence about a key, and the path to this key."""
 
     predicate: str
     path: Key = ()
@@ -143,7 +140,7 @@ def _line(fault: Fault) -> InitErrorDetails:
 
 
 def faults_of(error: ValidationError) -> Iterator[Fault]:
-    """Yield the faults inside an error that `refuse` raised."""
+    """Yield the faults inside a pydantic error that `refuse` raised."""
     for line in error.errors():
         yield Fault(line["msg"], line["loc"], line["type"] == AT_KEY)
 
@@ -154,12 +151,12 @@ def shorten(text: str, most: int = 200) -> str:
 
 
 def is_storable(text: str) -> bool:
-    """Return False for a text with half of a surrogate pair, which UTF-8 does not have."""
+    """Return False for a text with an unpaired surrogate, which UTF-8 does not have."""
     return text.isascii() or not re.search("[\ud800-\udfff]", text)
 
 
 def quote(value: Any) -> str:
-    """Return a value as shown after "got"."""
+    """Return a value as text, as it is shown after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
     text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
@@ -167,7 +164,7 @@ def quote(value: Any) -> str:
 
 
 def list_words(words: Iterable[str]) -> str:
-    """Return the words to choose from."""
+    """Return a text that lists the words to choose from."""
     return " | ".join(words)
 
 
@@ -225,13 +222,13 @@ def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
 
 
 class JobLoader(yaml.SafeLoader):
-    """PyYAML's safe loader with RESOLVERS."""
+    """PyYAML's safe loader with the rules RESOLVERS for plain words."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
 
 class JobDumper(yaml.SafeDumper):
-    """PyYAML's safe dumper with RESOLVERS: it quotes texts that `JobLoader` would not read as text."""
+    """PyYAML's safe dumper with the rules RESOLVERS: it quotes texts that `JobLoader` would not read as text."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
