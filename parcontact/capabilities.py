@@ -1,12 +1,12 @@
-"""Capabilities: what a folder of `effects/` adds to the program. A folder that is deleted takes its capability with it.
+"""Capabilities: each folder of `effects/` adds one to the program, and a deleted folder removes it.
 
-A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`;
-columns stand there, too (`stated`). Other rooms
-find what its further modules offer by `offers`, and so name no capability. `GIVES` and `USES` name what an effect finds
-in a step for others, and what it needs of others: effects that give something follow a step before those that use it.
-With `MATERIAL = True` the section is a material, which may include a file. `CHANGES_STEPS` names the keys that change
-steps which a run has completed, if these are not all keys of the section. `STAGE_KEYS` are the keys that a section adds
-to stages."""
+The package of a folder may state `SECTION`, the section of a job that turns it on, `EFFECT`, the name of its class in
+`effect.py`, and columns (`stated`). Other folders of the program find what its further modules contain by `offers`, and
+so name no capability. `GIVES` and `USES` name quantities of a step that an effect computes for other effects, and that
+it needs from them: effects that give something act before those that use it. With `MATERIAL = True` the section is a
+material, which may include a file. `CHANGES_STEPS` names the keys that change steps which a run has completed, if these
+are not all keys of the section. `STAGE_KEYS` are the keys that a section adds to stages.
+"""
 
 from collections.abc import Collection, Mapping
 from functools import cache
@@ -20,20 +20,20 @@ ROOM = f"{__package__}.effects"
 
 @cache
 def folders() -> tuple[ModuleType, ...]:
-    """Return the packages of all capabilities; those that use something come after those that give it."""
+    """Return the packages of all capabilities; a package that uses something comes after the package that gives it."""
     found = [each.name for each in iter_modules(import_module(ROOM).__path__) if each.ispkg]
     made = {name: import_module(f"{ROOM}.{name}") for name in found}
     return tuple(made[name] for name in in_order({name: needs_of(each) for name, each in made.items()}))
 
 
 def needs_of(thing: Any) -> tuple[Collection[str], Collection[str]]:
-    """Return what a capability gives to others, and what it uses of others."""
+    """Return the names of what a capability gives to others, and of what it uses from others."""
     return getattr(thing, "GIVES", ()), getattr(thing, "USES", ())
 
 
 def in_order(needs: Mapping[str, tuple[Collection[str], Collection[str]]]) -> list[str]:
-    """Return names in the order of the alphabet, but for those that use something, which come after those that give it.
-    `needs` has what each gives and uses."""
+    """Return names in alphabetical order, except that a name which uses something comes after the name that gives it.
+    `needs` has what each name gives and uses."""
     order, left = list[str](), sorted(needs)
     while left:
         given = {one: set(needs[one][0]) for one in left}
@@ -55,10 +55,11 @@ def _modules(name: str) -> tuple[ModuleType, ...]:
 
 
 def stated(name: str) -> list[Any]:
-    """Return what the folders themselves state under a name: columns and the like, which are there at once."""
+    """Return the objects called `name` in the packages of all capabilities, such as columns, without further
+    imports."""
     return [getattr(each, name) for each in folders() if hasattr(each, name)]
 
 
 def offers(module: str, name: str) -> list[Any]:
-    """Return what modules of one name offer under a name, one of each capability that has such a module."""
+    """Return the objects called `name` in the modules called `module` of all capabilities that have such a module."""
     return [getattr(each, name) for each in _modules(module) if hasattr(each, name)]

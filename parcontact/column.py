@@ -20,7 +20,7 @@ class Column:
     when: str = ""
 
     def value(self, row: Any) -> Any:
-        """Return the value of this column in a row."""
+        """Return the value of this column for a row."""
         return (self.of or attrgetter(self.name))(row)
 
 

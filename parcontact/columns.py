@@ -1,7 +1,6 @@
 """Columns of all tables that are written (name, SI unit, meaning, value in a row), and their files.
 
-Here are also the names of columns in tables of moduli, shift factors, spectra and heights that users give, and how
-headers spell them.
+The names of columns in users' tables of moduli, shift factors, spectra and heights are here, too, with their spellings.
 
 Tables are the csv files, the rows of a run in Python, and the maps in `fields.h5`. The lists of columns on the manual's
 page `outputs` are generated from here. A column with `when` exists only if the job has that section or option.
@@ -47,14 +46,14 @@ SHIFT = re.compile(r"(?:log(?:_?10)?|lg)[\s_(]*([ab])_?t\)?")  # log_aT, log10(a
 
 
 class MeasuredColumn(NamedTuple):
-    """A name of NAMES, or another text, and a unit; None if the cell has none."""
+    """A name of NAMES, or another text, and a unit; None if the header cell has no unit."""
 
     name: str
     unit: str | None
 
 
 def read_cell(cell: str) -> MeasuredColumn:
-    """Return the name and the unit in a cell of a header."""
+    """Return the name and the unit in a cell of a table's header."""
     text = re.sub(r'^"(.*)"$', r"\1", cell.strip())
     if name := find_name(text):  # E(t), tan(delta)
         return MeasuredColumn(name, None)
@@ -80,7 +79,7 @@ def plain_unit(unit: str) -> str:
 
 
 def find_name(text: str) -> str:
-    """Return the name of NAMES that a text means, by a word, a symbol, or both; '' if there is none."""
+    """Return the name of NAMES that a header text means, by a word, a symbol, or both; '' if there is none."""
     text = re.sub(r"\s+", " ", text.strip(" ,:")).replace("″", "''").replace("′", "'").replace("’", "'")
     if text in NAMES or (name := _symbol(text)):
         return text if text in NAMES else name

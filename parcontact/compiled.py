@@ -39,7 +39,7 @@ def pointwise(function: Function) -> Function:
 
 
 def cache_path(compiled: Any) -> Path | None:
-    """Return the directory in which machine code of a compiled function is kept, or None."""
+    """Return the directory that stores the machine code of a compiled function, or None."""
     kept = _cache_of(compiled)
     return Path(kept.cache_path) if kept and kept.cache_path else None
 

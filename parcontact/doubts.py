@@ -1,7 +1,8 @@
 """Warnings as data (kind, place, numbers), and the sentences that users read.
 
-Code that checks a job, a surface or a contact returns `Doubt`s. Each `Kind` of them is next to its test, that of a
-capability in its folder. No code compares or parses the sentences."""
+Code that checks a job, a surface or a contact returns warnings as `Doubt` objects. Each `Kind` of warning is defined
+next to its test. No code compares or parses the sentences.
+"""
 
 import math
 import string
@@ -34,15 +35,14 @@ class Doubt:
 
     @property
     def subject(self) -> tuple[str, ...]:
-        """Return kind, place and names except `where`: doubts with the same subject differ in numbers only."""
+        """Return kind, place and names except `where`: warnings with the same subject differ only in numbers."""
         names = (value for name, value in self.numbers.items() if isinstance(value, str) and name != "where")
         return self.kind, self.place, *names
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of warning: its name, and its sentence with places for numbers. It stands next to the test that decides,
-    which calls it for a `Doubt`."""
+    """A kind of warning: its name, and its sentence with places for numbers. Calling it returns a `Doubt`."""
 
     name: str
     sentence: str

@@ -1,9 +1,7 @@
-"""Errors that a user can correct.
+"""Errors that a user can correct, and directories for files that a user keeps between runs.
 
-Directories for files that a user keeps between runs: compiled loops, transform plans.
-
-These files are executed or trusted unread, so no other user may be able to write them: they are kept in a directory of
-mode 0700 in the user's cache directory, or not at all.
+Such files are compiled loops and plans of transforms. They are executed or trusted unread, so that no other user may be
+able to write them: they are stored in a directory of mode 0700 in the user's cache directory, or not at all.
 """
 
 import os
@@ -53,7 +51,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def directory(name: str) -> Path | None:
-    """Return the program's directory `name` in the user's cache directory, made if missing; None if it is not safe."""
+    """Return the program's directory `name` in the user's cache directory, created if missing; None if unsafe."""
     with suppress(OSError, RuntimeError):
         home = Path.home()
         given = Path(os.environ.get("XDG_CACHE_HOME") or "")

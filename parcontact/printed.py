@@ -1,6 +1,7 @@
-"""Numbers formatted for readers: prefixes of units, shares in per cent, as many digits as the error allows.
+"""Numbers formatted for readers: prefixes of units, shares in per cent, and as many digits as the error allows.
 
-Texts contain ± and µ; `streams` replaces them on terminals that cannot show them."""
+Texts contain ± and µ; `streams` replaces them on terminals that cannot show them.
+"""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ MOST_DIGITS = 6  # limit on the digits of a number with an error
 
 
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
-    """Return the unit with the prefix that suits the largest value, and the size of the prefixed unit in `unit`.
+    """Return the unit with the prefix that suits the largest value, and the size of this prefixed unit in `unit`.
 
     Prefixes of m² change by factors of a million, and values down to a thousandth keep the larger unit. °C, m³ and
     dimensionless values have no prefix. Times of two minutes or more are in minutes, hours, days or years.
@@ -30,7 +31,7 @@ def prefixed(unit: str, largest: float) -> tuple[str, float]:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Return a number with its unit: 11.7 µm."""
+    """Return a number with its unit and a suitable prefix: 11.7 µm."""
     rounded = float(f"{value:.{digits}g}") + 0.0  # no -0
     shown, size = prefixed(unit, rounded)
     number = value if shown in TIMES else rounded  # a time is rounded in its own unit
@@ -38,12 +39,12 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def rounded_up(value: float, digits: int = 3) -> str:
-    """Return a number that is rounded to few digits, and not below the value: advice on a least value."""
+    """Return a number rounded up to few digits, for advice on a least value."""
     return _round_towards(value, digits, 1)
 
 
 def rounded_down(value: float, digits: int = 3) -> str:
-    """Return a number that is rounded to few digits, and not above the value: advice on a largest value."""
+    """Return a number rounded down to few digits, for advice on a largest value."""
     return _round_towards(value, digits, -1)
 
 

@@ -17,14 +17,14 @@ CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u20
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters and characters that reverse lines replaced by their codes."""
+    """Return the text with control characters, and characters that reverse lines, replaced by their codes."""
     return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}" if ord(found[0]) > 255 else repr(found[0])[1:-1], text)
 
 
 class TolerantStream(io.TextIOBase):
-    """A stream that writes to another one, and drops text if that is closed or full, or lacks characters.
+    """A stream that writes to another stream, and drops text if this one is closed or full, or lacks characters.
 
-    `plain`: control characters except tabs and ends of lines are replaced; a progress bar needs them.
+    If `plain`, control characters except tabs and ends of lines are replaced; a progress bar needs them.
     """
 
     def __init__(self, stream: TextIO | None, plain: bool) -> None:
@@ -123,7 +123,7 @@ class Bar:
 
 
 def with_bar(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
-    """Yield the items, with a bar that counts the finished ones."""
+    """Yield the items, with a progress bar that counts the finished ones."""
     bar = Bar(len(items), what, unit)
     try:
         for item in items:

@@ -1,16 +1,14 @@
 """Tables of numbers and arrays that users give, as instruments and laboratories write them.
 
-One list has the names of all columns.
-
 Numbers are separated by semicolons, tabs, commas or blanks, with decimal points, or with decimal commas between
 semicolons, tabs or blanks. A mark at the end of every row, or at its beginning, is no cell. Words such as No Data,
 --- and #N/A, and empty cells, are missing numbers (NaN). Lines that begin with #, % or // are comments.
 
-The names of columns stand in the last line above the numbers that names enough of them, also in a comment: with units
-in brackets, `Frequency (Hz)`, `f[Hz]`, or behind a slash, `E'/MPa`, or in a row of their own below the names. A long
-name and a symbol may stand together: `Storage Modulus E' (MPa)`. Lines of a laboratory may stand above.
+The names of columns are in the last line above the numbers that has enough of them, also in a comment: with units in
+brackets, `Frequency (Hz)`, `f[Hz]`, or behind a slash, `E'/MPa`, or in a row of their own below the names. A long name
+and a symbol may stand together: `Storage Modulus E' (MPa)`. Lines of a laboratory may stand above.
 
-Read .npy files that users give, and refuse heights out of range; damaged files raise InputError.
+Files .npy that users give are read, too; heights out of range and damaged files raise InputError.
 """
 
 from __future__ import annotations
@@ -206,12 +204,12 @@ class Table:
     lines: list[int]
 
     def unit(self, name: str, known: dict[str, float]) -> float:
-        """Return the size of the unit of a column. Raises InputError if it is not one of `known`."""
+        """Return the size of the unit of a column in SI. Raises InputError if the unit is not one of `known`."""
         return unit_size(self.path, name, self.units[name], known)
 
 
 def unit_size(path: Path, name: str, unit: str, known: dict[str, float]) -> float:
-    """Return the size of the unit of a column. Raises InputError if it is not one of `known`."""
+    """Return the size of a column's unit in SI. Raises InputError if the unit is not one of `known`."""
     if unit not in known:
         raise InputError(f"{path}: the unit of {name} must be one of {', '.join(known)}, got {unit or 'none'!r}")
     return known[unit]
@@ -225,7 +223,7 @@ def read_named_columns(
     enough: Callable[[set[str]], bool],
     plain: Set[str] = NUMBERS,
 ) -> Table:
-    """Return the columns of a table with names.
+    """Return the columns of a table whose columns have names.
 
     Columns with a name of `names` must hold numbers, and others are ignored. `enough` decides whether the names in a
     line are those of a header. Columns with a name of `plain` need no unit. Raises InputError with file and line.
@@ -339,7 +337,7 @@ def _split_like(text: str, dialect: Dialect, count: int) -> list[str]:
 
 
 def header_of(line: str, count: int) -> list[MeasuredColumn]:
-    """Return the `count` columns that a line above rows of numbers names; [] if it does not."""
+    """Return the `count` columns that are named in a line above rows of numbers; [] if the line names none."""
     text = re.sub(r"^\s*(#|%|//)+", "", line)
     named = ([read_cell(cell) for cell in cells] for cells in _splits(text, Dialect(None)) if len(cells) == count)
     return max(named, key=_known, default=[])

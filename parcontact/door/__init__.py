@@ -1,1 +1,1 @@
-"""The door holds the verbs of the command line, the Python interface, and the manual."""
+"""The user's access to the program: verbs of the command line, the Python interface, and the manual."""

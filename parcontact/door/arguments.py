@@ -66,7 +66,7 @@ degrees = checked(_floats, bool, "a list of temperatures [deg C]")
 
 
 def instant(text: str) -> str:
-    """Return the text of a step (digits) or of a time [s]."""
+    """Return the text if it is a step (digits) or a time [s]."""
     checked(float, lambda value: 0.0 <= value < INFINITE, "a step, as a whole number, or a time [s]")(text)
     return text.strip()
 
@@ -78,7 +78,7 @@ def output_directory(text: str) -> str:
 
 
 def results_path(text: str) -> Path:
-    """Return the path of an output directory or of a file of results. Raises InputError for pipes and devices."""
+    """Return the path of an existing output directory or file of results. Raises InputError for pipes and devices."""
     from ..files import files
 
     files.refuse_pipes(Path(text))
@@ -120,7 +120,7 @@ def fluid(text: str) -> Any:
 
 
 def pressure_drop(text: str) -> tuple[float, float]:
-    """Return two pressures [Pa] from HIGH:LOW."""
+    """Return the two pressures [Pa] in a text HIGH:LOW."""
     try:
         high, low = map(float, text.split(":"))
     except ValueError:
@@ -336,7 +336,7 @@ def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
 
 
 def without_restart(words: Sequence[str]) -> list[str]:
-    """Return the words of the command line that continues the run of these `words`."""
+    """Return the command line that continues the run of the command line `words`, as words."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--restart")
     return parser.parse_known_args(words)[1]

@@ -1,7 +1,7 @@
 """`parcontact doctor`: checks of an installation.
 
 * Checks of the machine: ranks, libraries, speed, and files that a run writes and reads.
-* A bench for checks: it runs small jobs and compares results with exact values.
+* A bench runs small jobs and compares their results with exact values.
 * Checks of an installation against exact solutions, and the table of results.
 * Small jobs for checks, as mappings.
 """
@@ -46,7 +46,7 @@ Watch = Callable[[March], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """A result, its exact value, and the allowed absolute error."""
+    """A result of a check, the exact value, and the allowed absolute error."""
 
     what: str
     found: float
@@ -55,7 +55,7 @@ class Finding:
 
     @property
     def share(self) -> float:
-        """Return the error over the allowed error; infinite for NaN."""
+        """Return the error divided by the allowed error; infinite for NaN."""
         error = abs(self.found - self.expected)
         if math.isnan(error):
             return math.inf
@@ -86,7 +86,7 @@ class Bench:
 
     @property
     def nearest(self) -> str:
-        """Return the finding with the largest `share`."""
+        """Return a text on the finding with the largest `share`."""
         return self.failure or str(max(self.findings.values(), key=lambda found: found.share))
 
     # -- running -------------------------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ INTEGRATORS: tuple[Integrator, ...] = ("exponential", "exponential-linear", "bac
 
 
 def zener(modulus_inf: float, moduli: Sequence[float], times: Sequence[float]) -> Json:
-    """Return a material with relaxing branches; an elastic one without."""
+    """Return a material with relaxing branches; an elastic material without `moduli`."""
     if not len(moduli):
         return {"model": "elastic", "shear_modulus": modulus_inf}
     branches = [{"modulus": m, "relaxation_time": t} for m, t in zip(moduli, times, strict=True)]
@@ -165,7 +165,7 @@ def zener(modulus_inf: float, moduli: Sequence[float], times: Sequence[float]) -
 def wave(
     history: Sequence[Json], waves: tuple[int, int] = (1, 0), points: tuple[int, int] = (8, 3), **job: Any
 ) -> Json:
-    """Return a job of one wave on a square box; stages without a load are in full contact."""
+    """Return a job of one wave on a square box; in stages without a load the contact is full."""
     loads = {"pressure", "force", "approach"}
     return {
         "grid": {"points": list(points), "size": WAVELENGTH},
@@ -224,10 +224,10 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
 
 
 def prepare_loops(comm: "MPI.Intracomm") -> str:
-    """Run small jobs so that the loops that checks do not need are compiled too; return a line. Collective.
+    """Run small jobs so that loops that checks do not need are compiled, too; return a line of text. Collective.
 
-    The jobs slide steadily, slide in mixed precision, and adhere in both boundaries. Capabilities have loops of their
-    own.
+    The jobs slide steadily, slide in mixed precision, and adhere in periodic and free boxes. Effects compile their own
+    loops.
     """
     began = time.perf_counter()
     touch = {"pressure": 3e4, "duration": 1e-3, "time_step": 5e-4}
@@ -345,8 +345,8 @@ def nearly_full(bench: Bench) -> None:
 
 
 def closed_by_load(bench: Bench) -> None:
-    """Check sliding in full contact of many waves: steady and stepped forces are sums over waves in closed form, and
-    the steady friction agrees with Persson's theory for any gamma."""
+    """Check sliding in full contact of many waves: forces in steady sliding and in time steps are sums over waves in
+    closed form, and the steady friction agrees with Persson's theory for any gamma."""
     velocity, points = 0.3 * WAVELENGTH / RELAXATION, 16
     surface = [
         {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES

@@ -29,7 +29,7 @@ def is_map(path: Path) -> bool:
 
 
 def load_map(path: Path, overrides: Sequence[str]) -> Job:
-    """Return a job whose surface is a whole measured map, on the points of the map, changed by the overrides. Raises
+    """Return a job whose surface is a whole measured map, on the points of the map, with the overrides applied. Raises
     InputError."""
     try:
         return mesh.load(_job_of(str(path)), overrides)
@@ -40,13 +40,14 @@ def load_map(path: Path, overrides: Sequence[str]) -> Job:
 
 
 def refuse_taken(target: Path | None) -> None:
-    """Raise InputError if the file of the job to start from exists."""
+    """Raise InputError if the file `target` for a new job exists already."""
     if target is not None and os.path.lexists(target):
         raise InputError(f"--job: {target} already exists; give another name")
 
 
 def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
-    """Write a job to start from to `target`, or yield its text, with at most MANY_POINTS points. Raises InputError."""
+    """Write a job for the user to start from to `target`, or yield its text, with at most MANY_POINTS points. Raises
+    InputError."""
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
     found["surface"] |= {key: value for key, value in plain_data(job.surface[0]).items() if key != "path"}

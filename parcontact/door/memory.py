@@ -1,15 +1,15 @@
-"""Memory and costs of a job, for its plan.
+"""Memory of a job's run and costs of its steps, for a plan.
 
-Exact memory of a rank in maps, and size of a checkpoint [bytes], from the job.
+The memory of a rank in maps, and the size of a checkpoint [bytes], follow exactly from the job.
 
 The constructors of a run are called on a slab that counts memory without allocating it (`parallel.slab.Slab.planned`).
 
-Trials of jobs: some steps are made in memory, and the others are assumed to cost the same.
+In a trial of a job some steps are made in memory, and all others are assumed to cost the same.
 
-Each stage has an equal share of the time. When it is used up, one long step leads to the end of the stage. The first
-steps of a stage, where the load may jump, are not used for the others. If a job is too large to reach its steps in half
-of the time, its steps are counted and timed on a quarter of the points along each side, and the price of transforms on
-its own grid is known from what it did. Times are those of the processor, so that other programs disturb them little.
+Each stage has an equal share of the time. When the share is used up, one long step leads to the end of the stage. The
+first steps of a stage, where the load may jump, do not count for later ones. If a job is too large to reach its steps
+in half of the time, its steps are counted and timed on a quarter of the points along each side, and transforms on its
+own grid are timed until then. Times are processor times, which other programs disturb little.
 """
 
 import math
@@ -65,8 +65,8 @@ NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energi
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
     """Return the memory of a rank in maps and transform buffers [bytes], by purpose.
 
-    The default rank is the last one, which has the most, except for the spectrum of the surface, for which the largest
-    memory of all ranks is returned.
+    The default is the last rank, which has the most memory; for the spectrum of the surface, the largest memory of all
+    ranks is returned.
     """
     slab = _slab(job, ranks, rank)
     scene = build_on(outline(job, slab))
@@ -105,7 +105,7 @@ def steady_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def most_bytes(job: Job, ranks: int) -> int:
-    """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and saved
+    """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and with saved
     fields, or in the steady state from which a run starts."""
     (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
     if not job.history:
@@ -136,7 +136,7 @@ def on_tiles(job: Job) -> int:
 
 def saved(job: Job) -> int:
     """Return the size of the maps in a checkpoint [bytes], with a checksum of 4 bytes per row. Effects declare their
-    own maps, some of which exist in checkpoints only."""
+    maps themselves, as some exist only in checkpoints."""
     (nx, ny), scene = job.grid.points, build_on(outline(job, _slab(job, 1, 0)))
     memories = _completed(scene)
     parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
@@ -201,14 +201,14 @@ COARSER, LEAST = 4, 32  # ratio of the points along a side in successive trials,
 
 
 class OutOfTimeError(Exception):
-    """The time of a trial is over."""
+    """The time of a trial has been used up."""
 
 
 class TimedSlab(Slab):
     """A slab whose sums over ranks raise OutOfTimeError once, on all ranks, after one of them has reached the instant
     `end` of its `process_time`.
 
-    It remembers the time of the processor and the counts before the first solve.
+    `begun` holds the processor time and the counts before the first solve.
     """
 
     end = math.inf
@@ -225,7 +225,7 @@ class TimedSlab(Slab):
 
     @property
     def price(self) -> float:
-        """Return the time of a transform since the first solve over its N log N [s]; 0 if there was none."""
+        """Return the time of a transform since the first solve, divided by its N log N [s]; 0 if there was none."""
         if self.begun is None:
             return 0.0
         before, tally = self.begun
@@ -265,10 +265,10 @@ class StageCost:
 
 @dataclass(frozen=True)
 class Trial:
-    """Costs of a `job` by a trial on `ranks` ranks: those of its stages, or of its steady states as one stage.
+    """Costs of a `job`, measured in a trial on `ranks` ranks, for each stage, or for all steady states as one stage.
 
-    `points` are those of the grid that was tried, `building` is the time in which its scene was set up [s], and `price`
-    the time of its transforms over their N log N, in the end relative to that on the grid of the job.
+    `points` are the points of the grid that was tried, `building` is the time in which its scene was set up [s], and
+    `price` the time of its transforms divided by N log N, in the end relative to the price on the grid of the job.
     """
 
     job: Job
@@ -293,23 +293,24 @@ class Trial:
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
 
     def share(self, ranks: int) -> float:
-        """Return the work of a rank, if `ranks` share the grid of the job, over that of a rank in the trial."""
+        """Return the work of a rank, if `ranks` share the grid of the job, divided by its work in the trial."""
         return self.price * _work(*self.job.grid.points) / _work(*self.points) * self.ranks / ranks
 
     def step(self, ranks: int, overhead: float) -> float:
-        """Return the mean time of a step [s], if an operator call on a few points takes `overhead` [s]."""
+        """Return the mean time of a step [s] on `ranks` ranks, with `overhead` [s] for an operator call on few
+        points."""
         each, calls = (self.total(name) / max(self.steps, 1) for name in ("seconds", "operator"))
         fixed = min(overhead * calls, each) if ranks > self.ranks else 0.0
         alone = each * self.share(self.ranks)
         return fixed + (alone - fixed) * self.ranks / ranks
 
     def case(self, ranks: int, overhead: float) -> float:
-        """Return the time of a run without the start of the program [s]."""
+        """Return the time of a run on `ranks` ranks [s], without the start of the program."""
         return self.building * self.share(ranks) + self.steps * self.step(ranks, overhead)
 
 
 def try_job(job: Job, slab: Slab, seconds: float) -> Trial | None:
-    """Try a job for about `seconds` [s]; None if it is too large for that; collective.
+    """Return the costs of a job from a trial of about `seconds` [s]; None if the job is too large for it; collective.
 
     Raises InputError for files that do not match the job.
     """
@@ -368,7 +369,7 @@ def _coarser(job: Job) -> Iterator[Job]:
 
 def warm_up(job: Job, slab: Slab) -> float:
     """Make the first steps, or steady states, of a tiny scene, so that later ones include no compilation. Return the
-    time of an operator call there [s]; collective."""
+    time [s] of an operator call in this scene; collective."""
     small = _tiny(job)
     if small is None:
         return 0.0

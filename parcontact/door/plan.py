@@ -2,8 +2,8 @@
 
 A plan has the effects of a job, the memory of a rank, and steps and times by a trial.
 
-The first case of a sweep is planned in full. The last case and one between are tried. The times of the others follow
-from the nearest tried case in proportion to their work, which is steps (or steady states) times N log N.
+The first case of a sweep is planned in full. The last case and one in between are tried. The times of other cases
+follow from the nearest tried case in proportion to the work, which is steps (or steady states) times N log N.
 """
 
 import math
@@ -38,7 +38,7 @@ STEADY_START, STEADY_STATES = "steady start, before", "steady states"
 
 
 def effects(job: Job) -> Iterator[str]:
-    """Yield a line for each effect, on or off, and why; for a friction curve only effects of steady states."""
+    """Yield a line for each effect, on or off, with the reason; for a friction curve only effects of steady states."""
     own = [section for section, effect in find_effects().items() if getattr(effect, "in_curves", False)]
     known = {*OF_STEADY_STATES, *own}
     found = [effect for effect in choices(job).decisions if job.history or effect.name in known]
@@ -49,7 +49,7 @@ def effects(job: Job) -> Iterator[str]:
 
 
 def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
-    """Yield a table of the memory of a rank by purpose; `program` is its memory without maps [bytes]."""
+    """Yield a table of the memory of a rank by purpose; `program` is the memory of a rank without maps [bytes]."""
     if job.history:
         columns = [memory.holdings(job, count) for count in ranks]
     else:
@@ -76,7 +76,7 @@ def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
 
 
 def steps(trial: Trial) -> Iterator[str]:
-    """Yield lines on the number of steps, or steady states, and on the work of each."""
+    """Yield lines on the number of steps, or steady states, and on the work of each step."""
     job, word = trial.job, "step" if trial.job.history else "state"
     whole = trial.tried >= trial.steps
     if job.steady and not job.history:
@@ -98,7 +98,7 @@ def steps(trial: Trial) -> Iterator[str]:
 
 
 def times(trial: Trial, ranks: Sequence[int], started: float, overhead: float) -> Iterator[str]:
-    """Yield a table of times; on other numbers of ranks than those of the trial each has its share of the work."""
+    """Yield a table of times; for other numbers of ranks than in the trial, each rank has its share of the work."""
     word = "a step" if trial.job.history else "a state"
     rows = {
         f"{word} [s]": [f"{trial.step(count, overhead):.3g}" for count in ranks],
@@ -113,7 +113,7 @@ def times(trial: Trial, ranks: Sequence[int], started: float, overhead: float) -
 
 
 def unit_of(most: float) -> tuple[str, float]:
-    """Return the name and the size [bytes] of the unit for values up to `most` [bytes]."""
+    """Return the name and the size [bytes] of a unit that suits values up to `most` [bytes]."""
     return ("GB", 1e9) if most >= LARGE else ("MB", 1e6)
 
 
@@ -142,8 +142,8 @@ KILO = 1024  # unit of resident memory in `getrusage` [bytes]
 
 @dataclass
 class Planner:
-    """Plans jobs for the numbers of `ranks`, within about `seconds` [s] of the processor since the program began,
-    of which the first half may be used up before a trial; `started` [s] is the time that the program took to start.
+    """Plans jobs for the numbers of `ranks`, within about `seconds` [s] of processor time since the program began; half
+    of it may be used up before a trial. `started` [s] is the time that the program took to start.
 
     Trials are appended to `found`, and `overhead` is the time of an operator call on a few points [s].
     """
@@ -155,8 +155,7 @@ class Planner:
     overhead: float = 0.0
 
     def plan(self, job: Job, slab: Slab, trials: int = 1) -> Iterator[str]:
-        """Yield the plan of a job as lines, which is one of several trials; collective: all ranks must exhaust the
-        iterator."""
+        """Yield the plan of a job, one of several trials, as lines; collective: all ranks must exhaust the iterator."""
         yield from effects(job)
         parts = [job] * bool(job.history) + [only_steady_states(job)] * (job.steady is not None)
         for part in parts:
@@ -209,7 +208,7 @@ class Planner:
 
 
 def only_steady_states(job: Job) -> Job:
-    """Return the job with its steady states only."""
+    """Return the job without its history, with only its steady states."""
     section = job.steady.model_copy(update={"pressures": request(job).pressures}) if job.steady else None
     return job.model_copy(update={"history": (), "steady": section, "initial": type(job.initial)()})
 
@@ -221,7 +220,7 @@ def cases_to_try(count: int) -> list[int]:
 
 
 def case_times(cases: Sequence[Case], tried: dict[int, float]) -> list[float]:
-    """Return the time of each case [s] from the nearest tried case, in proportion to its work."""
+    """Return the time of each case [s] from the nearest tried case, in proportion to the work of both."""
     nearest = [min(tried, key=lambda index: abs(index - place)) for place in range(len(cases))]
     return [
         tried[index] * _work(case.job) / _work(cases[index].job) for index, case in zip(nearest, cases, strict=True)
@@ -236,7 +235,7 @@ def _work(job: Job) -> float:
 
 
 def measure_program(slab: Slab) -> int:
-    """Return the largest number of bytes that a rank has taken so far: libraries and loops, if no large maps were made.
+    """Return the largest memory of a rank so far [bytes]: libraries and loops, if no large maps were made.
 
     Collective.
     """

@@ -62,7 +62,7 @@ WORDS = {  # patterns and their replacements, applied in this order
 
 @contextmanager
 def python_words() -> Iterator[None]:
-    """Reword errors raised within the context for Python users."""
+    """Reword errors that are raised within the context, so that they name arguments of Python functions."""
     try:
         yield
     except (InputError, RunError) as error:
@@ -167,7 +167,7 @@ def path_of(path: object) -> Path:
 
 
 def of_parts(**parts: Any) -> Job:
-    """Return a job from some sections, on this rank only. Raises JobError."""
+    """Return a job from some sections, made on this rank only. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
     return _sound(mesh.load(rest | parts))
 
@@ -193,16 +193,16 @@ Values = str | float | Sequence[float] | Array | None
 
 @dataclass(frozen=True)
 class Curve:
-    """Steady states: arrays of shape (points,), for each temperature all velocities under each pressure.
+    """A friction curve: arrays of shape (points,), for each temperature all velocities under each pressure.
 
-    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-, dissipated power over load and velocity, plus interface
-    friction], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-, relative
-    errors of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the nominal area,
-    counted and corrected at edges], `force_x`, `force_y` [N, on the rigid surface], `approach`, `mean_gap` [m],
-    `max_pressure` [Pa], `residual` [-, of the solve]; `power` [W, shape (points, branches), dissipated by each branch;
-    none for a free scene]; `temperature` [deg C, NaN if not requested], `shift_factor` [-, relaxation times over those
-    at the reference]; `flash_temperature`, `max_temperature` [K, mean rise in the contact and highest rise; NaN without
-    `thermal`], `error_flash` [-, relative error of the mean rise].
+    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-, dissipated power divided by load and velocity, plus
+    interface friction], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-,
+    relative errors of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the
+    nominal area, counted and corrected at edges], `force_x`, `force_y` [N, on the rigid surface], `approach`,
+    `mean_gap` [m], `max_pressure` [Pa], `residual` [-, of the solve]; `power` [W, shape (points, branches), dissipated
+    by each branch; no branches for a free box]; `temperature` [deg C, NaN if not requested], `shift_factor` [-,
+    relaxation times divided by those at the reference temperature]; `flash_temperature`, `max_temperature` [K, mean
+    rise in the contact and highest rise; NaN without `thermal`], `error_flash` [-, relative error of the mean rise].
 
     Points that could not be solved are NaN, with the reason in `failures`.
     """
@@ -246,7 +246,7 @@ def steady(
 
     `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
     spaced in the logarithm (default: the job's `steady` section, and the pressure of its first loaded stage);
-    `temperatures` [deg C] as a list, for a material with a shift (default: that section). Raises JobError, and
+    `temperatures` [deg C] as a list, for a material with a shift (default: the `steady` section). Raises JobError, and
     InputError for missing velocities or pressures; warns (ParcontactWarning, on root) about failed points and
     implausible values. Nothing is written.
     """
@@ -313,7 +313,7 @@ def _numbers(name: str, values: Values, ranges: bool = True) -> tuple[float, ...
 
 
 def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
-    """Return the results of a run, also of a running one, as a dataset.
+    """Return the results of a run, which may still be running, as an xarray dataset.
 
     The columns of measures.csv along `step`, with the coordinate `time` [s]; maps of fields.h5 as `pressure_map`,
     `gap_map`, ..., of shape (t, y, x), read when used, with the coordinates `t` [s] and `map_step`:
@@ -343,7 +343,7 @@ def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
 
 
 def material(material: Mapping[str, Any]) -> Material:
-    """Return the material of a job's section. Raises JobError for mistakes."""
+    """Return the material that a job's section describes. Raises JobError for mistakes."""
     job = of_parts(material=material)
     spring, moduli, times = relaxation_of(job.material)
     return Material(spring, tuple(moduli.tolist()), tuple(times.tolist()), job.material.poisson)

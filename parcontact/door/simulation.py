@@ -1,7 +1,7 @@
 """The public class `Simulation`.
 
-* Running a job in this process, step by step, with access to its fields and state.
-* Measures of a step, by the names of columns of measures.csv.
+* `Simulation` runs a job in this process, step by step, with access to its fields and state.
+* `Row` has the measures of a step, by the names of columns of measures.csv.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from .python import Given, agree, all_ranks, path_of, python_words, read_job_her
 
 
 class Row(Mapping[str, float]):
-    """An instant of a run: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
+    """Measures of an instant: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
 
     Energies [J] that the job does not request (`output.energy`) are NaN. `dict(row)` has all columns. Type checkers
     know the columns of the page `outputs` as attributes; columns of branches and of other effects are
@@ -99,13 +99,13 @@ class Row(Mapping[str, float]):
 
     @classmethod
     def from_record(cls, row: recorder.StepRow, added: tuple[str, ...] = ()) -> Row:
-        """Return a recorded row; `added` are the names of columns of effects."""
+        """Return the row of a recorded step; `added` are the names of columns of effects."""
         branches = len(row.branch_dissipation)
         return cls(dict(zip(recorder.columns(branches, added), recorder.row_numbers(row, branches), strict=True)))
 
     @classmethod
     def from_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
-        """Return the row in a line of measures.csv; the number of branches follows from its length."""
+        """Return the row in a line of measures.csv; the number of branches follows from the length of the line."""
         cells = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in line.split(",")]
         branches = len(cells) - len(recorder.columns(0, added))
         return cls(dict(zip(recorder.columns(branches, added), cells, strict=True)))
@@ -166,8 +166,8 @@ class Simulation:
     def steps(self) -> Iterator[Row]:
         """Yield the row of the initial state, then one after each step, which is made on demand in memory.
 
-        A second call continues after the last step. Raises RunError for a failed step, and keeps the state before the
-        step. All ranks must make each step: if one leaves the loop by `break` or an exception, the others raise
+        A second call continues after the last step. Raises RunError for a failed step, and keeps the state before it.
+        All ranks must make each step: if one rank leaves the loop by `break` or an exception, the others raise
         RunError.
         """
         march, self._stepped = self._march, True
@@ -213,7 +213,7 @@ class Simulation:
 
     @property
     def row(self) -> Row:
-        """Return the measures of the last step, also before a restart; before the first step, of the initial state."""
+        """Return the measures of the last step, also before a restart; before the first step, the initial state."""
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
@@ -222,18 +222,18 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Return True if all steps are made, or if the surfaces have detached under their load."""
+        """Return True if all steps are made, or if the surfaces have detached for good under their load."""
         return bool(self.detached) or self._march.row.step >= len(self._march.timeline())
 
     @property
     def detached(self) -> str:
-        """Return when and why the surfaces detached under their load, which ends the history; '' otherwise."""
+        """Return when and why the surfaces detached for good under their load; '' if they did not."""
         return self._march.detached
 
     @property
     def errors(self) -> dict[str, dict[str, float]]:
         """Return the known estimated relative errors so far, as printed at the end of a run: of `friction` and
-        `contact_area_corrected`, by source and in total (`total`). Rows have the errors of their instant."""
+        `contact_area_corrected`, by source and in total (`total`). Rows have the errors of single instants."""
         return {name: dict(parts) for name, parts in self._march.state.errors.facts(None).items() if name != "accuracy"}
 
     # -- fields -------------------------------------------------------------------------------------------------------
@@ -245,7 +245,7 @@ class Simulation:
 
     def field(self, name: str) -> Array:
         """Return this rank's rows of a map as a new array, shape (ny_loc, nx): `pressure` [Pa], `displacement` [m] of
-        the body, `height` [m] of the rigid surface in its present position, or `gap` [m] between both.
+        the body, `height` [m] of the rigid surface in its present position, or `gap` [m] between body and surface.
 
         Raises InputError for another name.
         """
@@ -282,8 +282,8 @@ class Simulation:
     ) -> Simulation:
         """Return a simulation that continues from a checkpoint, in memory unless `set` gives `output.directory`.
 
-        `set` may change the future (later stages, tolerances), not the past. Raises InputError for a damaged file, or
-        one of another job.
+        `set` may change the future (later stages, tolerances), not the past. Raises InputError for a damaged or foreign
+        file.
         """
         world, file = all_ranks(comm), path_of(path)
         agree(world, file, set)

@@ -1,26 +1,22 @@
-"""`parcontact study`: errors and costs of settings.
-
-`parcontact study`: a sweep over meshes, steps and integrators; then limits, errors over time, and a picture.
-
-The settings of a study: their combinations, and the changes of the job.
+"""`parcontact study`: errors and costs of settings, from a sweep over meshes, steps and integrators.
 
 All meshes, cells per step and integrators are combined. For each integrator the mesh is also refined with the time
 steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
 
-Stages that choose their steps do so in every case, unless there is a ladder of cells per step, which replaces them in
-sliding stages.
+Stages that choose their steps do so in every case, unless the study lists cells per step, which then hold in sliding
+stages.
 
-Richardson extrapolation: the limit of values on finer and finer meshes, its order and its uncertainty.
+Richardson extrapolation gives the limit of values on finer and finer meshes, its order and its uncertainty.
 
 For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio of their differences, and
 
 f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
 
 with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 for
-different ratios of sizes). The uncertainty is the larger change of the limit if the order changes by DOUBT, or if, with
-four sizes, the finest one is left out; at least LEAST_DOUBT of the last difference.
+different ratios of sizes). The uncertainty is the larger of two changes of the limit: if the order changes by DOUBT,
+and with four sizes, if the finest one is left out. It is at least LEAST_DOUBT of the last difference.
 
-Results of a study: limits, errors of all cases, the best settings, and sentences about them.
+Results of a study are limits, errors of all cases, the best settings, and sentences about them.
 """
 
 import itertools
@@ -54,7 +50,7 @@ MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
 
 @dataclass(frozen=True)
 class Settings:
-    """One combination: points along x, cells per step (of its mesh; None for chosen steps), and integrator."""
+    """A combination of settings: points along x, cells per step (of its mesh; None for chosen steps), integrator."""
 
     mesh: int
     cells_per_step: float | None
@@ -62,7 +58,7 @@ class Settings:
 
     @property
     def time_step(self) -> float:
-        """Return the time step in lengths of the box; for chosen steps about one cell."""
+        """Return the time step as a distance in lengths of the box; for chosen steps about one cell."""
         return (self.cells_per_step or 1.0) / self.mesh
 
     @property
@@ -75,7 +71,7 @@ class Settings:
 
     @property
     def directory(self) -> Path:
-        """Return the directory of the case in that of the study. It stays the same if ladders get longer."""
+        """Return the directory of the case in the study's directory. It does not change if ladders get longer."""
         cells = AUTO if self.cells_per_step is None else f"{self.cells_per_step:.9g}"
         return Path(CASES, f"{self.mesh}-{cells}-{self.integrator}")
 
@@ -88,10 +84,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class Ladders:
-    """Ladders from the coarsest to the finest setting; a single value without a ladder.
+    """Lists of settings from coarse to fine; a single value for a setting that is not varied.
 
-    `shared` is the relative error that all cases may have in common: the accuracy of chosen steps, else 0. Unless
-    something `slides`, friction is not assessed.
+    `shared` is the relative error that all cases may have in common: the accuracy of chosen steps, else 0. Friction is
+    assessed only if something `slides`.
     """
 
     meshes: tuple[int, ...]
@@ -117,7 +113,7 @@ def _cells_of_time_steps(job: Job) -> float:
 
 
 def ladders(job: Job) -> Ladders:
-    """Return the ladders of a job's study. Raises InputError without ladders."""
+    """Return the lists of settings of a job's study. Raises InputError if there is none."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
@@ -135,7 +131,7 @@ def ladders(job: Job) -> Ladders:
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
-    """Return the overrides for a case of the job; all time steps change in the same proportion."""
+    """Return the overrides that change the job to a case; all time steps change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += [
@@ -164,8 +160,8 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
 
 
 def make_cases(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Case]:
-    """Return the cases of a study, with output directories of their own. Raises InputError with the mistakes of the
-    first case that has any."""
+    """Return the cases of a study with their directories. Raises InputError with the mistakes of the first wrong
+    case."""
     cases = dict[Settings, Case]()
     for one in refined.combine():
         try:
@@ -190,7 +186,7 @@ def _chosen_values(job: Job) -> list[tuple[str, float]]:
 
 
 def describe_choices(job: Job) -> list[str]:
-    """Return sentences on the settings that are equal, or chosen for the accuracy, in every case."""
+    """Return sentences on the settings that are equal in every case, or chosen by the accuracy."""
     own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
     lines = [f"{key}: {value:.4g} m in every case, chosen by auto for {own}" for key, value in _chosen_values(job)]
     refined = _sliding(job) if job.study and job.study.cells_per_step else []
@@ -269,7 +265,7 @@ Outcomes = Mapping[Settings, Outcome]
 
 @dataclass(frozen=True)
 class StudyFinding:
-    """The limit of one quantity along one ladder of one integrator."""
+    """The limit of one quantity along one list of settings, for one integrator."""
 
     quantity: str
     integrator: str
@@ -287,8 +283,8 @@ class StudyFinding:
 
 
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
-    """Return sizes and cases of each ladder from coarse to fine: mesh and time together, mesh alone, time alone; for
-    chosen steps the mesh only."""
+    """Return sizes and cases of each refinement from coarse to fine: mesh and time together, mesh alone, time alone;
+    for chosen steps only the mesh."""
     usual = [case for case in outcomes if case.integrator == integrator]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
     together = sorted((c for c in usual if _is_same(c.cells_per_step, coarse)), key=lambda case: case.mesh)
@@ -317,7 +313,7 @@ def judged(ladders: Ladders) -> list[str]:
 
 
 def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
-    """Return the limit of every quantity along every ladder."""
+    """Return the limit of every quantity along every refinement."""
     found = []
     for integrator in ladders.integrators:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
@@ -328,11 +324,11 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
-    """Return the best limit of each quantity: along mesh and time together, the least uncertain one with an order;
-    without a ladder of meshes along time alone.
+    """Return the reference of each quantity: the limit along mesh and time together, the least uncertain one with an
+    order; along time alone if meshes are not varied.
 
-    Without such a ladder, or without differences, it is the most expensive case, with unknown error. Errors that all
-    cases have in common do not show in a limit, so its uncertainty is at least `ladders.shared`.
+    Without such a refinement, or without differences, the reference is the most expensive case, with unknown error.
+    Errors that all cases have in common do not show in a limit, so that its uncertainty is at least `ladders.shared`.
     """
     found = [one for one in limits(ladders, outcomes) if one.ladder == TIME]
     if len(ladders.meshes) > 1:
@@ -356,12 +352,12 @@ def estimate_errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[st
 
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Return the errors, each at least the uncertainty of its reference."""
+    """Return the errors, each raised to the uncertainty of its reference if that is larger."""
     return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 
 def worst(error: Mapping[str, float]) -> float:
-    """Return the largest of the assessed errors; NaN without any."""
+    """Return the largest of the assessed errors; NaN if there are none."""
     values = [error[name] for name in NEEDED if not math.isnan(error.get(name, math.nan))]
     return max(values, default=math.nan)
 
@@ -392,7 +388,8 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     """Run all cases of a study, one after the other on all ranks; collective. Return the exit code.
 
     `make` returns the job changed by overrides. All jobs are read before the first case runs. After a stop the same
-    command continues. The directory has the results of a sweep, and those of the study once all cases are finished.
+    command continues. The directory has the results of a sweep, and the results of the study once all cases are
+    finished.
     """
     refined = ladders(job)
     cases = make_cases(job, refined, make)
@@ -417,7 +414,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
 
 
 def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: int) -> list[str]:
-    """Write limits, errors and a picture of finished cases; return the sentences of study.txt; root only."""
+    """Write limits, errors and a picture of the finished cases; return the sentences of study.txt; root only."""
     place = job.output.directory
     rows = dict(zip(cases, Results(place, "sweep").cases, strict=True))
     reference = references(refined, rows)

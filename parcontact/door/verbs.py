@@ -1,7 +1,7 @@
 """Verbs of the command line, from options to exit code. Each imports its modules when it runs, to start quickly.
 
-A verb works on the job, or on the chosen cases of its sweep. The launcher's environment variables tell which rank is
-root, so verbs without MPI start at once; the other ranks then print nothing and exit with code 0.
+A verb works on the job, or on the selected cases of its sweep. The launcher's environment variables state which rank is
+root, so that verbs without MPI start at once; other ranks then print nothing and exit with code 0.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def _refuse_surroundings() -> None:
 
 
 def root_alone(verb: Verb) -> Verb:
-    """Return a verb that only root executes; MPI starts if there are several ranks, as imports on root may start it."""
+    """Return a verb that only root executes. With several ranks MPI is started first, as imports on root may start
+    it."""
 
     @wraps(verb)
     def act(options: argparse.Namespace) -> int:

@@ -1,6 +1,6 @@
 """Distributed transforms, and what is stored and multiplied in them.
 
-Distributed two-dimensional real FFT: a local pass along x, a transpose between ranks, a local pass along y.
+The two-dimensional real FFT has a local pass along x, a transpose between ranks, and a local pass along y.
 
 A map of this rank's rows `(ny_loc, nx)` becomes a spectrum of this rank's x-wavenumbers `(ny, nkx_loc)`, in which y
 is local. With lengths larger than the map (zero padding) only the rows of the map are transformed along x and sent.
@@ -12,18 +12,19 @@ transforms a block, multiplies it by the symbol and transforms it back while it 
 blocks a transform holds one map, and on several ranks its messages, which are less than a map. In single precision
 rows of x-wavenumbers begin at cache lines.
 
-Exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
+The transpose exchanges rows with all x-wavenumbers for all rows of this rank's x-wavenumbers.
 
-It is made in legs, each of some rows of every rank, so that messages never take more than a part of a map. A leg is
-sent before the next one is packed: to pack meanwhile takes a second buffer, and gained nothing on two ranks.
+The exchange is made in legs, each with some rows of every rank, so that messages never take more than a part of a map.
+A leg is sent before the next one is packed: packing at the same time takes a second buffer, and gained nothing on two
+ranks.
 
-Spectra stored as maps, exactly, so that files of maps can hold them on any number of ranks.
+Spectra can be stored exactly as maps, so that files of maps hold them for any number of ranks.
 
-The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by
-columns. Its real parts fill as many columns of a map, imaginary parts the rest. The imaginary parts of the first
-column and, if nx is even, of the last one do not fit: a second map holds those of `per_map` spectra.
+The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by columns.
+Its real parts fill as many columns of a map, imaginary parts the rest. The imaginary parts of the first column and, if
+nx is even, of the last column do not fit: a second map holds these columns of `per_map` spectra.
 
-Products of a symbol with the cosine series of a map: a convolution of the map continued mirrored at its edges.
+The product of a symbol with the cosine series of a map is a convolution of the map continued mirrored at its edges.
 
 The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the size of
 the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the even
@@ -33,7 +34,7 @@ points first, followed by the odd ones backwards, and V the transform of these n
     V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
 
 For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
-real part and n - k as its imaginary part. So messages, blocks and memory are as for the transform.
+real part and n - k as its imaginary part. So messages, blocks and memory are the same as for the transform.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -72,7 +73,7 @@ def wire_points(legs: list[slice], columns: int) -> int:
 
 
 class Leg:
-    """One leg, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
+    """One leg of the exchange, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
 
     Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; `wire`, the
     buffer of messages to other ranks.
@@ -172,8 +173,9 @@ class FFT:
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
     `dtype` float64 or float32 of calculations and messages, for maps of either type; `measured`: FFTW measures which
-    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: another transform of these lengths in double
-    precision, in whose spectrum one in single precision stores its own. The constructor and the methods are collective.
+    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: a transform of the same lengths in double
+    precision, in whose spectrum this one, in single precision, stores its own. The constructor and the methods are
+    collective.
     """
 
     def __init__(
@@ -208,12 +210,13 @@ class FFT:
 
     @cached_property
     def multiplicity(self) -> Array:
-        """Multiplicity (1 or 2) of each x-wavenumber of the half spectrum in the full one, shape (1, nkx_loc)."""
+        """Multiplicity (1 or 2) of each x-wavenumber of the half spectrum in the full spectrum, shape (1, nkx_loc)."""
         along_x = self.modes[0]
         return np.where((along_x == 0) | (2 * along_x == self.mx), 1.0, 2.0)
 
     def forward(self, field: Array) -> Spectrum:
-        """Return the spectrum `sum h exp(-i q x)` of a map; collective. It is a buffer, valid until the next call."""
+        """Return the spectrum `sum h exp(-i q x)` of a map, in a buffer that is valid until the next call;
+        collective."""
         self.along_x(field)
         for columns in self.column_blocks:
             self._along_y(self._y_forward, columns)
@@ -230,8 +233,8 @@ class FFT:
     def convolve(self, field: Array, symbols: Sequence[NDArray[np.inexact]], out: Array) -> Array:
         """Put `(mx my) backward(symbol * forward(field))` into `out`; the symbol includes the scaling. Collective.
 
-        Each of the `column_blocks` has its part of the symbol, contiguous in memory. A symbol that is even in q_y
-        may have only the rows of q_y >= 0, the first `my // 2 + 1`.
+        `symbols` has the symbol for each of the `column_blocks`, contiguous in memory. A symbol that is even in q_y may
+        have only the first `my // 2 + 1` rows, q_y >= 0.
         """
         self.along_x(field)
         for columns, symbol in zip(self.column_blocks, symbols, strict=True):
@@ -250,7 +253,7 @@ class FFT:
     # -- the pass along x ---------------------------------------------------------------------------------------------
 
     def along_x(self, field: Array, transform: Callable[[Array, Spectrum], None] | None = None) -> None:
-        """Transform from rows to columns of the spectrum; `transform` replaces the transform of blocks of rows;
+        """Transform this rank's rows to its columns of the spectrum; `transform` replaces the pass along x;
         collective."""
         self._count()
         transform = transform or self._transform_rows
@@ -399,12 +402,12 @@ def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]
 
 def edges(nx: int) -> int:
     """Return the number of columns of a spectrum whose imaginary parts have no place in a map of nx columns: the first
-    one, and that of Nyquist."""
+    column and the Nyquist column."""
     return 1 + (nx % 2 == 0)
 
 
 def per_map(nx: int) -> int:
-    """Return for how many spectra one map holds these columns."""
+    """Return the number of spectra for which one map holds the columns counted by `edges`."""
     return max(1, nx // edges(nx))
 
 
@@ -452,8 +455,8 @@ CosineWaves = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 class Cosines:
-    """Series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum, plus a
-    narrow block of columns. The constructor and the methods are collective."""
+    """Cosine series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum, plus
+    a narrow block of columns. The constructor and the methods are collective."""
 
     def __init__(self, fft: FFT) -> None:
         self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my
@@ -471,7 +474,7 @@ class Cosines:
 
     @property
     def modes(self) -> tuple[CosineWaves, CosineWaves]:
-        """Half waves along x and y of the real parts of a spectrum, and of the imaginary parts."""
+        """Half waves along x and y for the real parts of a spectrum, and for the imaginary parts."""
         columns, along_y = self.fft.columns, np.arange(self.my)[:, None]
         along_x = np.arange(columns.start, columns.stop)[None, :]
         return (along_x, along_y), (self.mx - along_x, along_y)
@@ -479,7 +482,7 @@ class Cosines:
     def convolve(self, field: Array, symbols: list[NDArray[np.complexfloating]], out: Array) -> Array:
         """Put `(nx ny) series^-1(symbol * series(field))` into `out`; collective.
 
-        Each of the `column_blocks` has its part of the symbol: its real part multiplies real parts of the spectrum,
+        `symbols` has the symbol for each of the `column_blocks`: its real part multiplies real parts of the spectrum,
         its imaginary part multiplies imaginary parts.
         """
         self.fft.along_x(field, self._transform_rows)

@@ -1,6 +1,7 @@
-"""pyfftw without its copies of scipy's interfaces, which are imported on demand; and FFTW's wisdom.
+"""pyfftw without its interfaces to scipy, which are imported on demand, and FFTW's wisdom (choices of algorithms).
 
-These interfaces import half of scipy, which takes a fifth of a second."""
+These interfaces import half of scipy, which takes a fifth of a second.
+"""
 
 import importlib
 import sys
@@ -32,8 +33,7 @@ __all__ = ["export_wisdom", "import_wisdom", "pyfftw"]
 
 
 def export_wisdom() -> bytes:
-    """Return the algorithms that FFTW has chosen in this process; another process may choose others, with other
-    rounding."""
+    """Return the algorithms that FFTW has chosen in this process; others, of another process, round differently."""
     return SEPARATOR.join(pyfftw.export_wisdom())
 
 

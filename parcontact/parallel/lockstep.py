@@ -2,7 +2,8 @@
 
 Every rank sends a checksum of 16 bytes of its next call to the others, and waits until all have. A rank that ends
 continues to answer the others until all have ended. If it ends with an exception while others wait for it within a
-step, it aborts them all."""
+step, it aborts them all.
+"""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""Rows of neighbours, and coarser grids.
+"""Exchange of rows of a map between ranks, and coarser grids.
 
-Exchange of whole rows of a map between ranks, point to point: each rank sends to those that want its rows.
+Whole rows are exchanged point to point: each rank sends to the ranks that need its rows.
 
-A `RowExchange` is a plan, found once from the rows of all ranks; it can be kept and used for any map of the slab.
+A `RowExchange` is a plan, made once from the rows of all ranks; it can be used for any map of the slab.
 
-Maps between a grid and a coarser one whose cells consist of whole fine cells; collective.
+Maps are transferred between a grid and a coarser grid whose cells consist of whole fine cells; collective.
 
-Grids of larger and larger cells, each of two by two cells of the one before, down to a single cell.
+A pyramid is a sequence of grids down to a single cell; each cell joins two by two cells of the grid before.
 
-The first `pairs` of them join two cells along x, or along y if `pairs` is negative. Cells at the end of the grid may
-be cut. A cell belongs to the rank that has its last row in the grid before, until there are so few cells that every
-rank has all of them, which needs no further messages.
+The first `pairs` grids join two cells along x, or along y if `pairs` is negative. Cells at the end of the grid may be
+cut. A cell belongs to the rank that has its last row in the grid before. Once there are few cells, every rank has all
+of them, which needs no further messages.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,7 +30,7 @@ Index = slice | NDArray[np.intp]
 
 
 class Part(NamedTuple):
-    """Rows of a map that go to one rank, or come from it."""
+    """Rows of a map that are sent to one rank, or received from it."""
 
     rank: int
     rows: Index
@@ -55,8 +55,8 @@ class RowExchange:
 
     @staticmethod
     def of_numbers(slab: Slab, wanted: NDArray[np.integer], rank: int) -> "RowExchange":
-        """Return the exchange of a few rows: `wanted` has the row numbers for each rank, shape (ranks, count); this one
-        is `rank`."""
+        """Return the exchange of a few rows: `wanted` has row numbers for each rank, shape (ranks, count); `rank` is
+        this one."""
         own, rows = wanted[rank], slab.rows
         asked = wanted if slab.comm.size > 1 else wanted[[rank]]
         here, there = (asked >= rows.start) & (asked < rows.stop), (own >= 0) & (own < slab.ny)
@@ -67,8 +67,8 @@ class RowExchange:
 
     @staticmethod
     def of_parts(slab: Slab, wanted: NDArray[np.integer]) -> "RowExchange":
-        """Return the exchange of consecutive rows: `wanted` has the first row for each rank and the one after its
-        last, shape (ranks, 2)."""
+        """Return the exchange of consecutive rows: `wanted`, shape (ranks, 2), has each rank's first row and the one
+        after its last."""
         start, stop = wanted[slab.comm.rank].tolist()
         leaving = _overlaps(wanted, slab.rows.start, slab.rows.stop)
         return RowExchange(slab, stop - start, leaving, _overlaps(slab.bounds, start, stop), True)
@@ -79,7 +79,7 @@ class RowExchange:
         return len(self._leaving) + len(self._coming)
 
     def fetch(self, values: NDArray[Any], out: NDArray[Any] | None = None) -> NDArray[Any]:
-        """Return the wanted rows of this rank, in `out` if it is given, contiguous; collective."""
+        """Return the rows that this rank wants, contiguous, in `out` if it is given; collective."""
         if out is None:
             out = self._make((self._count, values.shape[1]), values.dtype)
         for places, rows in self._kept:
@@ -116,8 +116,7 @@ def _overlaps(parts: NDArray[np.integer], start: int, stop: int) -> list[Part]:
 
 
 def fetch(slab: Slab, field: Array, wanted: NDArray[np.integer]) -> Array:
-    """Return rows of a map for this rank; `wanted` as for `RowExchange.of_parts`; collective. On one rank it is a view
-    of the map."""
+    """Return rows of a map for this rank; `wanted` as for `RowExchange.of_parts`; collective. A view on one rank."""
     if slab.comm.size == 1:
         return field[slice(*wanted[0].tolist())]
     return RowExchange.of_parts(slab, wanted).fetch(field)
@@ -134,14 +133,15 @@ def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
 
 
 def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
-    """Return the row of a map before this rank's first one, shape (nx,); collective. The row before the first of the
-    map is the last if the map is `cyclic`, otherwise the first itself. Ranks without rows get zeros."""
+    """Return the row of a map before this rank's first row, shape (nx,); collective. Before the first row of the map
+    comes the last row if the map is `cyclic`, otherwise the first row itself. Ranks without rows get zeros."""
     return _adjacent_rows(slab, field, (-1,), cyclic)[0]
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
-    """Return the rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
-    collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros."""
+    """Return `count` rows of a map before this rank's first row and after its last row, shape (count, nx), the nearest
+    first; collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get
+    zeros."""
     found = _adjacent_rows(slab, field, (*range(-1, -1 - count, -1), *range(count)), cyclic)
     return found[:count], found[count:]
 
@@ -158,8 +158,8 @@ def _adjacent_rows(slab: Slab, field: Array, offsets: tuple[int, ...], cyclic: b
 
 
 def numbers_next_to(bounds: NDArray[np.integer], offsets: tuple[int, ...]) -> NDArray[np.integer]:
-    """Return row numbers for each rank, shape (ranks, offsets), counted from its first row if an offset is negative
-    (-1 is the row before it), and from the one after its last row otherwise."""
+    """Return row numbers for each rank, shape (ranks, offsets). A negative offset counts from the rank's first row (-1
+    is the row before it), another one from the row after its last."""
     counted = np.array(offsets)
     return np.where(counted < 0, bounds[:, :1], bounds[:, 1:]) + counted
 
@@ -169,7 +169,7 @@ COARSEST = 32  # tuning: least points of a coarser grid along a direction
 
 def coarser(slab: Slab) -> Slab | None:
     """Return the grid with cells of twice the side, along each direction with an even and sufficient number of points;
-    None if there is none."""
+    None if there is no such direction."""
     points = next(coarser_points(slab.nx, slab.ny), None)
     return slab.resized(*points) if points else None
 
@@ -270,8 +270,8 @@ def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int
 
 
 def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
-    """Return a function of the rank that gives the rows of cells, `tall` rows each, that end in its rows of a finer
-    grid."""
+    """Return a function of the rank that returns the rows of cells, each `tall` fine rows high, that end in this rank's
+    rows of the finer grid."""
     if tall == 1:
         return fine.rows_of
     last = fine.comm.size - 1
@@ -285,8 +285,7 @@ def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
 
 @dataclass(frozen=True)
 class PyramidStep:
-    """The step from a grid of points to the next one, of cells of a `shape`. Methods are collective among the ranks of
-    the points."""
+    """The step from a grid of points to the next grid, of cells with a `shape`. Methods are collective."""
 
     fine: Slab
     coarse: Slab
@@ -295,12 +294,12 @@ class PyramidStep:
 
     @cached_property
     def above(self) -> int:
-        """Number of rows of points of the first own cell on another rank: 0 or 1."""
+        """Number of rows of points, 0 or 1, that this rank's first cell has on another rank."""
         return self.fine.rows.start % self.shape[1]
 
     @cached_property
     def own(self) -> slice:
-        """Slice of this rank's rows of cells: those whose last row of points is on this rank."""
+        """Slice of this rank's rows of cells: cells whose last row of points is on this rank."""
         part = ending_in(self.fine, self.shape[1])(self.fine.comm.rank)
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
@@ -313,11 +312,11 @@ class PyramidStep:
             self.fine.tally["bytes sent"] += cells[self.own].nbytes * (comm.size - 1)
 
     def adjacent_points(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
-        """Return rows next to those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape
+        """Return rows next to this rank's rows: -1 is the last row above, 0 the first below, 1 the next; shape
         (offsets, nx).
 
-        After the last row follows the first; if the number of rows is odd, with a row of zeros between. Ranks without
-        points get zeros. The result is empty for cells of one row.
+        The first row follows after the last; if the number of rows is odd, with a row of zeros in between. Ranks
+        without points get zeros. The result is empty for cells of one row.
         """
         if self.shape[1] == 1:
             return points[:0]

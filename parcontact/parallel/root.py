@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """Return or raise on every rank what `act` returns or raises on root; collective. If an exception cannot be
+    """Return or raise on every rank what `act()` returns or raises on root; collective. If an exception cannot be
     pickled, the other ranks raise RunError with its text."""
     if comm.size == 1:
         return act()
@@ -75,7 +75,7 @@ class Signals:
 
     @contextmanager
     def noted(self) -> Iterator[Signals]:
-        """Record signals within this context; outside it, they end the process at once. An outer context, such as the
+        """Record signals within this context; outside, they end the process at once. An outer context, such as the
         context of a sweep, keeps recording. Signals are recorded in the main thread only."""
         outer = getattr(signal.getsignal(SAVE), "__self__", None)
         if isinstance(outer, Signals) or threading.current_thread() is not threading.main_thread():

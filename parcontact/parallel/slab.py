@@ -19,17 +19,17 @@ Array = NDArray[np.floating]
 
 
 def deal(count: int, ranks: int) -> list[slice]:
-    """Split `count` items in order into one part per rank; parts differ by at most one item, and may be empty."""
+    """Return one part of `count` items for each rank, in order; parts differ by at most one item, and may be empty."""
     return [dealt_to(count, ranks, rank) for rank in range(ranks)]
 
 
 def dealt_to(count: int, ranks: int, rank: int) -> slice:
-    """Return the part of one rank, as `deal` returns it."""
+    """Return the part of one rank, equal to its part in `deal`."""
     return slice(count * rank // ranks, count * (rank + 1) // ranks)
 
 
 class PlannedRank:
-    """Replaces the communicator of one of several ranks in a plan; it communicates with nobody."""
+    """Replaces the communicator of one of several ranks in a plan; it exchanges no messages."""
 
     def __init__(self, size: int, rank: int) -> None:
         self.size, self.rank = size, rank
@@ -85,12 +85,12 @@ class Slab:
 
     @cached_property
     def bounds(self) -> NDArray[np.int64]:
-        """The first row of every rank and the one after its last, shape (ranks, 2)."""
+        """The first row of every rank and the row after its last, shape (ranks, 2)."""
         return np.array([(part.start, part.stop) for part in self.dealt], np.int64)
 
     @property
     def only_counts(self) -> bool:
-        """True on a `planned` slab."""
+        """True on a slab made by `planned`, which allocates nothing."""
         return self.tally.only_counts
 
     @property
@@ -125,9 +125,9 @@ class Slab:
     def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
         """Return sums and maxima over all ranks, sums first, in one message; NaN propagates. Collective.
 
-        Every rank receives the numbers of all and adds them in the order of ranks, so that all ranks, and repeated
-        runs, get the same bits. An Allreduce would not guarantee this, and would need a user-defined operator for
-        sums and maxima in one message.
+        Every rank receives the numbers of all ranks and adds them in the order of ranks, so that all ranks, and
+        repeated runs, get the same bits. An Allreduce would not guarantee this, and would need a user-defined operator
+        for sums and maxima in one message.
         """
         self.tally["allreduce"] += 1
         if self.comm.size == 1:
@@ -175,18 +175,17 @@ class Slab:
 
 
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
-    """Return an uninitialised array, aligned for SIMD transforms and counted; without memory if the tally
-    only counts."""
+    """Return an uninitialised array, aligned for SIMD and counted; without memory if the tally only counts."""
     array = without_memory(shape, dtype) if tally.only_counts else pyfftw.empty_aligned(shape, dtype=dtype, n=64)
     tally.hold(array)
     return array
 
 
 def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an array without memory: all its items share one place."""
+    """Return an array without memory: all its items share one place in memory."""
     return np.ndarray(shape, dtype, np.zeros(1, dtype), strides=(0,) * len(shape))
 
 
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return the memory of a contiguous array as another array, at most as large, for temporary use."""
+    """Return the memory of a contiguous array as another array that is not larger, for temporary use."""
     return np.ndarray(shape, dtype, buffer=array)

@@ -17,7 +17,7 @@ PURPOSE = "map bytes: "  # prefix of a ledger's counts by purpose
 
 
 class Tally(Counter[str]):
-    """Named counts of one rank, e.g. `tally["operator"]`; a name never counted reads 0.
+    """Named counts of one rank, e.g. `tally["operator"]`; a name that was never counted reads 0.
 
     Names in use: `fft` (2-D transforms, forward or backward), `fft 2048x2048 float64` (the same by size and
     precision), `operator` (applications of a pressure -> displacement operator or its inverse), `allreduce`, `messages`
@@ -50,7 +50,7 @@ class Tally(Counter[str]):
 
 
 class Ledger(Tally):
-    """Counts of a planned calculation that is not made.
+    """Counts for a plan: the calculation is not made.
 
     Its arrays have shapes and types but neither memory nor values. Bytes are also counted by purpose.
     """
@@ -69,8 +69,8 @@ T = TypeVar("T")
 
 
 class Groups:
-    """The ranks of `everyone` in `count` groups, at most as many as ranks: `number` is the group of this rank, `comm`
-    its ranks. The sizes of groups differ by at most one; the constructor is collective."""
+    """The ranks of `everyone` in `count` groups, at most one per rank: `number` is the group of this rank, `comm` the
+    communicator of this group. The sizes of groups differ by at most one; the constructor is collective."""
 
     def __init__(self, everyone: MPI.Intracomm, count: int = 1) -> None:
         self.everyone, self.count = everyone, max(1, min(count, everyone.size))
@@ -80,7 +80,7 @@ class Groups:
 
     @property
     def root(self) -> bool:
-        """True on the rank that decides for all groups."""
+        """True on the single rank that decides for all groups."""
         return self.everyone.rank == 0
 
     def agree(self, value: T) -> T:

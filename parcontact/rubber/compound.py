@@ -29,8 +29,8 @@ LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors", Density: "densit
 
 @dataclass(frozen=True)
 class Compound:
-    """The measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
-    `shift` (None for a table of one temperature).
+    """A measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference temperature,
+    and the `shift` (None for a table of one temperature).
 
     `poisson` converts Young's moduli; `weigh` names the modulus that is fitted, or both; `found` is the
     superposition of the sweeps, None if the shift is given.
@@ -44,7 +44,7 @@ class Compound:
     found: "Superposition | None" = None
 
     def material(self) -> dict[str, Any]:
-        """The material section of a job."""
+        """The fitted material as the section of a job."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
         degrees = self.measured.temperatures
         return {
@@ -191,11 +191,11 @@ def fitted(
     weigh: "Weigh" = "both",
     vertical: "Vertical" = "auto",
 ) -> Compound:
-    """Read a table and fit it.
+    """Return the compound fitted to a table of measured moduli.
 
-    `law` is wlf, arrhenius or free (constants are fitted, too), or a known shift; `vertical` is the law of b_T,
-    unless the known shift has one; `reference` [deg C] is by default the middle one of the measured temperatures.
-    Raises InputError, also for a table that no fit meets.
+    `law` is wlf, arrhenius or free (constants are fitted, too), or a known shift; `vertical` is the law of b_T, unless
+    the known shift has one; `reference` [deg C] is by default the middle of the measured temperatures. Raises
+    InputError, also for a table that no fit meets.
     """
     from . import moduli, series
     from .series import log_factors, superpose

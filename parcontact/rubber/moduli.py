@@ -8,10 +8,10 @@ behind a slash. The columns are:
 * `tan_del`; |E*| and |G*|, absolute values, and delta, the phase angle (deg, rad);
 * D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
-A modulus named by words alone is taken as Young's. If rates are in rad/s, as from rheometers, it is taken as the shear
-modulus, with a warning; so is a compliance. Missing moduli follow from tan delta or the phase angle.
-Columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set, and rows of
-one frequency at many temperatures are one set each.
+A modulus named by words alone is taken as Young's modulus. If rates are in rad/s, as from rheometers, it is taken as
+the shear modulus, with a warning; the same holds for a compliance. Missing moduli follow from tan delta or the phase
+angle. Columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set, and
+rows of one frequency at many temperatures are one set each.
 
 Checks refuse tables that cannot be of a measured rubber, and wrong units, before a fit.
 """
@@ -38,8 +38,8 @@ RISE = 0.1  # accuracy: relative rise of a relaxation modulus that scatter may c
 
 
 def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: Array | None) -> None:
-    """Raise InputError for rates or times `at` [rad/s or s], moduli `storage` [Pa] and temperatures [deg C], each of
-    shape (n,), that no measurement has."""
+    """Raise InputError for values that no measurement has: rates or times `at` [rad/s or s], moduli `storage` [Pa] and
+    temperatures [deg C], each of shape (n,)."""
     what = "frequencies" if kind == "frequency" else "times"
     decades = math.log10(at.max()) - math.log10(at.min())
     if decades > MOST_DECADES:
@@ -79,9 +79,9 @@ def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
     """Return the rms scatter of the logarithms of moduli: the deviation of a point from the curve through its two
     neighbours on either side.
 
-    `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan if all have less than five points. The
-    interpolation is cubic in the logarithms, so that smooth curves have no scatter. For independent errors the
-    deviation is divided by the root of 1 + the squares of its weights.
+    `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan if all sweeps have less than five points.
+    The interpolation is cubic in the logarithms, so that smooth curves have no scatter. Deviations are divided by the
+    root of 1 + the sum of squared interpolation weights, as for independent errors.
     """
     found = []
     for rates, moduli in sweeps:
@@ -114,8 +114,8 @@ EXAMPLE = "f[Hz] E'[MPa] E''[MPa]"
 class Set:
     """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
 
-    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of relaxation or creep. `storage`
-    and `loss`, shape (n,) [Pa], of shear. For relaxation `storage` is the relaxation modulus, for creep the inverse
+    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of relaxation or creep. `storage` and
+    `loss`, shape (n,) [Pa], are shear moduli. For relaxation `storage` is the relaxation modulus, for creep the inverse
     compliance, and `loss` is empty.
     """
 
@@ -127,9 +127,9 @@ class Set:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All sets of a file, by temperature; `tension`: Young's moduli were converted.
+    """All sets of a file, by temperature; `tension` is True if Young's moduli were converted.
 
-    `derived` is the modulus computed from the other one and tan delta, "stor" or "loss", or "". `doubts` are
+    `derived` is the modulus computed from the other modulus and tan delta: "stor", "loss", or "" for none. `doubts` are
     sentences about ambiguities and omissions.
     """
 
@@ -142,7 +142,7 @@ class Measurement:
 
     @property
     def temperatures(self) -> list[float]:
-        """Measured temperatures [deg C], rising; none if the file has none."""
+        """Measured temperatures [deg C], rising; an empty list if the file has none."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
     @property
@@ -168,7 +168,7 @@ class Measurement:
 
 
 def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
-    """Read a table; Young's moduli are converted to shear, `G = E/(2 (1 + nu))`. Raises InputError."""
+    """Return the measurement in a table, as shear moduli: `G = E/(2 (1 + nu))`. Raises InputError."""
     table = read_named_columns(path, "a table of moduli", EXAMPLE, MODULI | OTHERS, _are_enough)
     if len(table.lines) < LEAST_ROWS:
         raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {LEAST_ROWS} were expected")
@@ -193,7 +193,7 @@ class _Table:
     lines: Sequence[int]
 
     def measurement(self, poisson: float) -> Measurement:
-        """Return the columns as sets in SI units."""
+        """Return the columns of the table as sets in SI units."""
         doubts = tuple(self._name_letter(2.0 * (1.0 + poisson)))
         derived = self._complete()
         letter, kind = self._find_moduli()

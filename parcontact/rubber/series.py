@@ -1,18 +1,19 @@
 """Fits to measured moduli: Prony series, and shifts in time and modulus.
 
-A Prony series from measured moduli, with as many branches as the loss modulus needs.
+A Prony series is fitted to measured moduli, with as many branches as the loss modulus needs:
 
     G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
     J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
 
-A relaxation modulus or a storage modulus hardly determines the loss modulus, on which friction depends. Therefore
-the data are fitted twice. The first fit is a dense spectrum (`Spectrum`), by non-negative least squares of the
-relative errors with a penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum
-has a covariance, and the loss modulus an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J.
-Weese, Rheol. Acta 32 (1993) 65). The second is the shortest series that fits both moduli of this spectrum everywhere
-in the band. Creep is 1/J*(w) of its spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3).
+A relaxation modulus or a storage modulus hardly determines the loss modulus, on which friction depends. Therefore the
+data are fitted twice. The first fit is a dense spectrum (`Spectrum`), by non-negative least squares of the relative
+errors with a penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum has a
+covariance, and the loss modulus an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J. Weese, Rheol.
+Acta 32 (1993) 65). The second fit is the shortest series that fits both moduli of this spectrum everywhere in the band.
+For creep data the modulus is 1/J*(w) of the spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter
+3).
 
-Time-temperature superposition of measured sets: horizontal factors a_T and vertical factors b_T, fitted together.
+In time-temperature superposition of measured sets, horizontal factors a_T and vertical factors b_T are fitted together:
 
     G*(w, T) = b_T G*(a_T w, T_ref)
 
@@ -59,12 +60,13 @@ Errors = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PronySeries:
-    """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
+    """A fitted Prony series: `modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference.
 
-    `error` is the rms relative misfit of the fitted data; `best` the smallest one of any series; `alone` the same
-    for storage and for loss alone; `scatter` the relative scatter of neighbours in a sweep about a smooth curve, nan
-    if sweeps are too short. `band` [rad/s] holds the frequencies at which moduli are known, and `loss_errors` the
-    relative error (two standard deviations) of the loss modulus inside it, at its lower and its upper end.
+    `error` is the rms relative misfit of the fitted data; `best` the smallest misfit of any series; `alone` the
+    smallest misfits if only storage or only loss is fitted; `scatter` the relative scatter of data in a sweep about a
+    smooth curve, nan if sweeps are too short. `band` [rad/s] is the range of frequencies in which moduli are known, and
+    `loss_errors` are the relative errors (two standard deviations) of the loss modulus inside this range, at its lower
+    and at its upper end.
     """
 
     modulus_inf: float
@@ -86,8 +88,8 @@ class PronySeries:
         return float(self.modulus(np.array([omega]))[0].real)
 
     def response(self, kind: Kind, at: Array) -> Array:
-        """Return the data of a kind of measurement: storage before loss [Pa] at frequencies [rad/s], or G(t) or 1/J(t)
-        [Pa] at times [s]. For n frequencies or times, the shape is (2 n,) or (n,)."""
+        """Return what the series predicts for a kind of measurement: storage before loss [Pa] at frequencies [rad/s],
+        shape (2 n,), or G(t) or 1/J(t) [Pa] at times [s], shape (n,)."""
         if kind == "creep":
             return 1.0 / self._creep(at)
         return np.asarray(kernel(at, kind, self.times) @ np.append(self.moduli, self.modulus_inf))
@@ -102,10 +104,11 @@ class PronySeries:
 
 
 def kernel(at: Array, kind: Kind, times: Array) -> Array:
-    """Return what a weight of 1 contributes to each value of the data, shape (data, weights).
+    """Return the contribution of each unit weight to each value of the data, shape (data, weights).
 
-    First are the weights of the times. Then follows the weight of the spring; for creep those of the instantaneous
-    compliance and of the fluidity."""
+    Weights of the times come first, then the weight of the spring, or for creep the weights of the instantaneous
+    compliance and of the fluidity.
+    """
     if kind == "frequency":
         found = complex_kernel(at, kind, times)
         return np.vstack([found.real, found.imag])
@@ -115,7 +118,7 @@ def kernel(at: Array, kind: Kind, times: Array) -> Array:
 
 
 def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
-    """Return the contribution of each unit weight to G* at angular frequencies [rad/s], for creep to J*."""
+    """Return the contribution of each unit weight to G* at angular frequencies [rad/s]; to J* for creep."""
     z, one = 1j * omega[:, None] * times, np.ones((omega.size, 1))
     if kind == "creep":
         return np.hstack([1.0 / (1.0 + z), one, 1.0 / (1j * omega[:, None])])
@@ -124,8 +127,9 @@ def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
 
 @dataclass(frozen=True)
 class ReducedData:
-    """The data of all sets, reduced to one temperature: `at`, shape (n,), frequencies [rad/s] or times [s], and
-    `moduli` [Pa], shape (n,) of G(t) or 1/J(t), or (2 n,), storage before loss. Those in `counts` are fitted."""
+    """The data of all sets, reduced to one temperature. `at`, shape (n,), are frequencies [rad/s] or times [s];
+    `moduli` [Pa] have the shape (n,) for G(t) or 1/J(t), (2 n,) for storage before loss. Data in the slice `counts` are
+    fitted."""
 
     kind: Kind
     at: Array
@@ -139,33 +143,33 @@ class ReducedData:
 
     @property
     def rates(self) -> tuple[float, float]:
-        """Lowest and highest rate [1/s]."""
+        """Lowest and highest rate of the data [1/s]."""
         rates = self.at if self.kind == "frequency" else 1.0 / self.at
         return float(rates.min()), float(rates.max())
 
     @property
     def band(self) -> tuple[float, float]:
-        """Angular frequencies [rad/s] between which the data determine the moduli."""
+        """Range of angular frequencies [rad/s] in which the data determine the moduli."""
         low, high = self.rates
         return (low, high) if self.kind == "frequency" else (low, 2 * math.pi / EARLIEST * high)
 
     def columns(self, times: Array) -> Array:
-        """Return the contribution of each unit weight to the fitted data, relative to them; creep is J over 1/(1/J)."""
+        """Return the contribution of each unit weight to the fitted data, divided by these; data of creep are J."""
         found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
         return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
 
     def misfit(self, response: Array) -> float:
-        """Return the rms misfit of the logarithms of a response to the fitted data."""
+        """Return the rms difference between the logarithms of a response and of the fitted data."""
         ratio = np.maximum(response, np.finfo(float).tiny)[self.counts] / self.moduli[self.counts]
         return float(np.sqrt(np.mean(np.log(ratio) ** 2)))
 
     def find_spring(self, storage: Array) -> float:
-        """Return the mean excess of measured storage moduli over those of a spectrum without a spring [Pa]."""
+        """Return the mean excess [Pa] of measured storage moduli over `storage` of a spectrum without a spring."""
         measured = self.moduli[: self.at.size]
         return max(0.0, float(np.mean(1.0 - storage / measured) / np.mean(1.0 / measured)))
 
     def exchanged_misfit(self) -> float:
-        """Return the rms misfit of the best series if storage and loss moduli are exchanged."""
+        """Return the rms misfit of the best series after storage and loss moduli are exchanged."""
         moduli = np.roll(self.moduli, self.at.size)
         return _rms(best_residuals(replace(self, moduli=moduli, counts=slice(None))))
 
@@ -197,8 +201,10 @@ def _non_negative(columns: Array, goal: Array | None = None) -> Array:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A dense spectrum of relaxation times (for creep: retardation times) [s] with weights [Pa or 1/Pa], and a matrix
-    whose product with its transpose is the covariance of the weights."""
+    """A dense spectrum of relaxation times (for creep: retardation times) [s] with weights [Pa or 1/Pa].
+
+    `deviations` is a matrix whose product with its transpose is the covariance of the weights.
+    """
 
     kind: Kind
     times: Array
@@ -281,9 +287,9 @@ def _scale(times: Array, weights: Array, inside: slice) -> Array:
 def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> PronySeries:
     """Return the shortest series that fits the data as closely as the smooth spectrum does.
 
-    At all rates of the data its moduli differ from those of the spectrum by at most `error`, plus the standard
-    deviation of the loss modulus if that is smaller. It has at least a branch per decade. `sweeps` are rates and
-    moduli, from which the scatter is computed.
+    At all rates of the data the moduli of the series differ from the spectrum's by at most `error`, plus the standard
+    deviation of the loss modulus if it is smaller. The series has at least one branch per decade. `sweeps` are rates
+    and moduli, from which the scatter is computed.
     """
     spectrum, (low, high), (slow, fast) = Spectrum.fit(data), data.band, data.rates
     decades = math.log10(fast / slow)
@@ -400,8 +406,8 @@ BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, b
 
 @dataclass(frozen=True)
 class Superposition:
-    """A fitted shift, its `misfit` (rms, relative), and the result with `free` vertical factors if that is
-    much better."""
+    """A fitted shift, its `misfit` (rms, relative), and the result with `free` vertical factors if it is much
+    better."""
 
     shift: Shift
     misfit: float
@@ -447,7 +453,8 @@ class _Search:
         return self.measured.temperatures
 
     def start(self) -> Array:
-        """Return initial constants of the horizontal law: their logarithms, or log10 of free factors over the first."""
+        """Return initial constants of the horizontal law: logarithms of its constants, or log10 of the ratios of free
+        factors to the first factor."""
         if not isinstance(self.law, str):
             return np.zeros(0)
         if self.law == "free":
@@ -499,7 +506,7 @@ class _Search:
         return Density(EXPANSION, self.reference) if kind == "density" else None
 
     def refine(self, start: Array, kind: Vertical, per_decade: int = DENSE) -> Superposition:
-        """Return the best shift near initial constants, with a vertical law of a kind. Shifts are compared by series of
+        """Return the best shift near initial constants, with the vertical law `kind`. Shifts are compared by series of
         `per_decade` times per decade."""
         if self.law == "free" and kind == "free":
             return self._refine_both(start, per_decade)

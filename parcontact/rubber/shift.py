@@ -1,4 +1,4 @@
-"""Time-temperature superposition: at a temperature T a compound relaxes as at the reference, `a_T` times as slowly.
+"""Time-temperature superposition: relaxation times at a temperature T are a_T times those at the reference temperature.
 
 WLF         log10 a_T = -C1 (T - T_ref)/(C2 + T - T_ref)      (M. L. Williams, R. F. Landel, J. D. Ferry,
                                                                J. Am. Chem. Soc. 77 (1955) 3701)
@@ -9,7 +9,8 @@ Moduli are b_T times those at the reference:
 
 density     b_T = rho T/(rho_ref T_ref), temperatures in K     (J. D. Ferry, Viscoelastic Properties of Polymers (1980),
             rho = rho_ref (1 - expansion (T - T_ref))           chapter 11: the entropy of a network)
-table       log10 b_T given at some temperatures, likewise"""
+table       log10 b_T given at some temperatures, likewise
+"""
 
 import math
 from bisect import bisect_left
@@ -51,7 +52,7 @@ class Density:
 
 @dataclass(frozen=True)
 class WLF:
-    """`C1` [-] and `C2` [K] at the reference temperature [deg C]."""
+    """Shift law of Williams, Landel and Ferry: `C1` [-] and `C2` [K] at the reference temperature [deg C]."""
 
     C1: float
     C2: float
@@ -72,7 +73,7 @@ class WLF:
 
 @dataclass(frozen=True)
 class Arrhenius:
-    """Activation `energy` [J/mol] and reference temperature [deg C]."""
+    """Shift law of Arrhenius: activation `energy` [J/mol] and reference temperature [deg C]."""
 
     energy: float
     reference: float
@@ -91,7 +92,7 @@ class Arrhenius:
 
 @dataclass(frozen=True)
 class Factors:
-    """log10 of a_T at rising temperatures [deg C]; 0 at the reference."""
+    """Shift by a table: log10 of a_T at rising temperatures [deg C]; 0 at the reference temperature."""
 
     temperatures: tuple[float, ...]
     logs: tuple[float, ...]
@@ -120,7 +121,7 @@ Shift = WLF | Arrhenius | Factors  # shift of relaxation times, which are given 
 
 
 def highest_temperature(shift: Shift) -> float:
-    """Return the temperature [deg C] at which the tables of a shift end; inf for laws."""
+    """Return the temperature [deg C] at which the tables of a shift end; inf for a law without tables."""
     tables = [law for law in (shift, shift.vertical) if isinstance(law, Factors)]
     return min((law.temperatures[-1] for law in tables), default=math.inf)
 
@@ -138,14 +139,14 @@ WARN_KELVIN = Kind(
 
 
 def doubt_kelvin(place: str, temperatures: Iterable[float | None]) -> Iterator[Doubt]:
-    """Yield a warning if the highest of some temperatures [deg C] is hotter than rubber endures."""
+    """Yield a warning if the highest of the `temperatures` [deg C] is hotter than rubber endures."""
     highest = max((value for value in temperatures if value is not None), default=0.0)
     if highest > HOTTEST:
         yield WARN_KELVIN(place, {"degrees": highest, "most": HOTTEST, "celsius": round(highest - ZERO, 6)})
 
 
 def read_shift(text: str, reference: float | None) -> str | Shift:
-    """Return the shift of a command line: the name of a law whose constants are to be fitted, or a law.
+    """Return the shift that a command line gives: the name of a law whose constants are to be fitted, or a known law.
 
     `wlf:8.86,101.6` and `arrhenius:1.2e5` have constants at the reference temperature; another text is the path of a
     file with the columns T[C] and log_aT, and optionally log_bT. Raises InputError.

@@ -1,7 +1,6 @@
-"""Names of types: what the functions of this package take and return.
+"""A rigid rough surface in full contact with a viscoelastic half-space on which it slides.
 
-A rigid rough surface in full contact with a viscoelastic half-space on which it slides. The problem is linear, so
-that the solution is exact.
+The problem is linear, so that the solution is exact.
 
 The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
 Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
@@ -11,7 +10,7 @@ of time after a change of velocity, and also a function of the time step for a t
     traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the surface per nominal area
     friction    mu = -traction . v/(|v| p0)
 
-valid while the pressure is positive everywhere. The pressure of a wave is ahead of it by the phase of M.
+valid while the pressure is positive everywhere. The pressure of a wave is ahead of the wave by the phase of M.
 
 Source: Eqs. (5) and (10) of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
 half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840. Wave arguments
@@ -32,7 +31,7 @@ ComplexValues = complex | Array | ComplexArray
 
 
 class Waves(NamedTuple):
-    """Complex amplitudes [m] and wave vectors [rad/m] of real waves; one of two opposite wave vectors is listed."""
+    """Complex amplitudes [m] and wave vectors [rad/m] of real waves; of two opposite wave vectors, one is listed."""
 
     amplitude: ComplexArray
     kx: Array
@@ -43,7 +42,7 @@ def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
     """Return the waves of a map of heights [m], shape (ny, nx), on a periodic rectangle of sides length_x and length_y
     [m].
 
-    The mean is left out. Raises ValueError for a wave of two points per period, whose slope its heights do not define.
+    The mean is left out. Raises ValueError for a wave of two points per period, whose heights do not define a slope.
     """
     heights = np.asarray(heights, float)
     ny, nx = heights.shape
@@ -67,7 +66,7 @@ def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
 
 def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> ComplexArray:
     """Return 2 k A conj(M) [Pa]: amplitude and phase of each wave of pressure relative to the moving surface; `modulus`
-    is M."""
+    is the transfer modulus M."""
     return 2 * np.hypot(kx, ky) * amplitude * np.conj(modulus)
 
 

@@ -11,11 +11,12 @@ replaced by history integrals (J creep compliance, G relaxation function):
     a^2 = R d,   a^3(t) = (3 R/16) int J(t-s) dW(s),   W(t) = (16/(3 R)) int G(t-s) d a^3(s),
     p(r, t) = (8/(pi R)) int G(t-s) d sqrt(a^2(s) - r^2)_+
 
-While it shrinks, its radius at the time t is that at the earlier time t1(t), given by int_{t1}^t G(t-s) d'(s) ds =
-0, and the integral for W ends at t1; contact is lost when t1 = 0.
+While the contact shrinks, its radius at the time t equals the radius at an earlier time t1(t), given by int_{t1}^t
+G(t-s) d'(s) ds = 0, and the integral for W ends at t1; contact is lost when t1 = 0.
 
 Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The
-body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays."""
+body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,8 +62,8 @@ def pressure(r: Values, force: Values, radius: Values, shear_modulus: Values, po
 
 
 def displacement(r: Values, force: Values, radius: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """Return the normal displacement u(r) of the surface [m], 0 far away (Johnson, Eqs. 3.41a and 3.42a). u = d -
-    r^2/(2R) in the contact and ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))/(pi R) outside."""
+    """Return the normal displacement u(r) of the surface [m], which vanishes far away (Johnson, Eqs. 3.41a and 3.42a):
+    u = d - r^2/(2R) in the contact and ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))/(pi R) outside."""
     a = contact_radius(force, radius, shear_modulus, poisson)
     r = np.maximum(r, 0)
     outer = np.maximum(r, a)
@@ -75,7 +76,8 @@ def displacement(r: Values, force: Values, radius: Values, shear_modulus: Values
 
 
 def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
-    """Return W(t) [N] at times t >= 0 [s], any shape; 0 after lift-off.
+    """Return the force W(t) [N] at times t >= 0 [s], any shape, for an approach that rises linearly in `rise_time` to
+    `peak_approach` and falls at the same rate; 0 after lift-off.
 
     W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds, where every term of the Prony series
     gives (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) with Kummer's function M.
@@ -89,7 +91,8 @@ def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius:
 
 
 def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
-    """Return the time at which contact is lost [s]: int_0^t G = 2 int_0^{t - rise_time} G, for any sphere and depth."""
+    """Return the time [s] at which a contact with the approach of `triangle_force` is lost: int_0^t G = 2 int_0^{t -
+    rise_time} G, for any sphere and depth."""
     series = normal_form(*material)
 
     def excess(t: float) -> float:

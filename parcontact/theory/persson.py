@@ -9,33 +9,33 @@ as in `full_contact` (G* in steady sliding, functions of time in any other histo
     <p grad h> = -int Phi 2 |q| q Im M P(|q|) S(|q|) d2q/(4 pi^2),   S = gamma + (1 - gamma) P^2
     mu = -<p grad h> . v/(|v| p0)
 
-The theory is exact in full contact, where P = 1. Otherwise it is an approximation, whose empirical factor gamma (1:
-none) corrects the friction.
+The theory is exact in full contact, where P = 1. Otherwise it is an approximation, in which an empirical factor gamma
+corrects the friction (1: no correction).
 
 Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; with time B. N. J. Persson and A. I. Volokitin, Phys. Rev. B
 65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102, as in Sec. 3.1
 of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". That paper prints
-no formula of the theory. The steady form above is the published one; with time, M is taken from full contact, and P is
-taken at the present time. A theory with P inside the integral over the past would differ in transients of partial
-contact only.
+no formula of the theory. The steady form above is the published form; in transients, M is taken from full contact, and
+P is taken at the present time. A theory with P inside the integral over the past would differ only in transients of
+partial contact.
 
-Integrals are sums over waves in `Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and
-`mean_pressure` (p0, Pa) the shape of the axes before; SI units.
+Integrals are sums over waves in `Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and `mean_pressure`
+(p0, Pa) has the shape of the other axes; SI units.
 
 Rings hold waves of equal wavenumber, of a spectrum or of a given surface. An isotropic spectrum is integrated by
 Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2): the share in contact falls like the root of
 log(k/smallest) at small areas, which is smooth in x. Partial sums within a ring follow from the polynomial through the
 points of its panel, so that sums and partial sums have the same errors.
 
-Histories have piecewise constant velocities: rest, starts, stops, reversals, changes of load. In the transfer modulus
-M of a wave (see `full_contact`) every term of the relaxation function has a memory m_j of how the wave has passed a
-point of the body. At constant omega = q . v, from a memory m_j(0) at t = 0 on,
+Histories have piecewise constant velocities: rest, starts, stops, reversals, changes of load. In the transfer modulus M
+of a wave (see `full_contact`) every term of the relaxation function has a memory m_j of the way in which the wave has
+passed a point of the body. For constant omega = q . v and a memory m_j(0) at t = 0,
 
     M(t) = G_inf + sum_j G_j m_j(t)
     m_j(t) = b_j + (m_j(0) - b_j) exp(-t/tau_j - i omega t),    b_j = i omega tau_j/(1 + i omega tau_j)
 
-exactly, for any t. A body at first contact has m_j = 1 (its instantaneous modulus), one in steady sliding has m_j =
-b_j. Contact area and friction follow from M and the load at each instant.
+exactly, for any t. At first contact a body has m_j = 1 (its instantaneous modulus), in steady sliding m_j = b_j.
+Contact area and friction follow from M and the load at each instant.
 
 Assumption: from first contact on the wave in full contact follows the surface, and a load p0(t) that changes or
 vanishes only changes the share in contact.
@@ -68,10 +68,10 @@ CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten a
 
 @dataclass(frozen=True)
 class Rings:
-    """Waves by rings, from the longest on; `starts` is the first wave of each ring.
+    """Waves of a surface in rings of equal wavenumber, from the longest; `starts` is the first wave of each ring.
 
-    `share`, shape (n, n), has for each ring of a panel of n the share of each ring of the panel that lies within it.
-    `stiffness` is that of the body over that of a half space for each wave, as of a layer.
+    A panel has n rings; `share`, shape (n, n), has for each ring of a panel the shares of all its rings that lie within
+    this ring. `stiffness` is the ratio of the body's stiffness to that of a half space for each wave, for a layer.
     """
 
     waves: Waves
@@ -89,7 +89,7 @@ class Rings:
         return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
 
     def within(self, own: Array) -> Array:
-        """Return sums up to the k of each ring, from the sums of the rings; both of shape (..., rings)."""
+        """Return sums up to the wavenumber k of each ring, from the sums `own` of the rings; both (..., rings)."""
         panels = own.reshape(*own.shape[:-1], -1, len(self.share))
         totals = panels.sum(axis=-1)
         before = np.cumsum(totals, axis=-1) - totals
@@ -168,12 +168,12 @@ def _partial_shares(nodes: Array, weights: Array) -> Array:
 
 
 def contact_share(mean_pressure: Values, rings: Rings, modulus: ComplexValues) -> Array:
-    """Return P(k) at each ring: the area in contact over the nominal one with waves up to its k."""
+    """Return P(k) at each ring: the area in contact divided by the nominal area, with waves up to the ring's k."""
     return _share(mean_pressure, rings.within(_variances(rings, modulus)))
 
 
 def contact_area(mean_pressure: Values, rings: Rings, modulus: ComplexValues) -> Array:
-    """Return A/A0, the area in contact over the nominal one, with all waves."""
+    """Return A/A0, the area in contact divided by the nominal area, with all waves."""
     return _share(mean_pressure, _variances(rings, modulus).sum(axis=-1, keepdims=True))[..., 0]
 
 
@@ -189,7 +189,7 @@ def traction(mean_pressure: Values, rings: Rings, modulus: ComplexValues, gamma:
 def friction_coefficient(
     mean_pressure: Values, rings: Rings, vx: float, vy: float, modulus: ComplexValues, gamma: float = GAMMA
 ) -> Array:
-    """Return mu with all waves for sliding at (vx, vy) [m/s], not 0."""
+    """Return the friction coefficient mu with all waves for sliding at (vx, vy) [m/s], not 0."""
     along = traction(mean_pressure, rings, modulus, gamma) @ np.array([vx, vy])
     return np.asarray(-along / (np.hypot(vx, vy) * mean_pressure))
 
@@ -208,7 +208,8 @@ def _share(mean_pressure: Values, variance: Array) -> Array:
 
 
 class SlidingLeg(NamedTuple):
-    """A stretch at constant velocity [m/s]: its duration [s], instants since its start [s], and p0 at these [Pa]."""
+    """A part of a history at constant velocity [m/s]: duration [s], instants since its start [s], and p0 [Pa] at
+    these."""
 
     velocity: tuple[float, float]
     duration: float
@@ -217,19 +218,19 @@ class SlidingLeg(NamedTuple):
 
 
 class TheoryOutcome(NamedTuple):
-    """<p grad h> [Pa], shape (instants, 2), and A/A0 at each instant."""
+    """Results at instants: traction <p grad h> [Pa], shape (instants, 2), and contact area A/A0, shape (instants,)."""
 
     traction: Array
     contact_area: Array
 
     def friction(self, pressures: Array) -> Array:
-        """Return the tangential over the normal force, not negative; 0 without load."""
+        """Return the tangential force divided by the normal force, not negative; 0 without load."""
         size = np.hypot(*self.traction.T)
         return np.divide(size, pressures, out=np.zeros_like(size), where=pressures > 0)
 
 
 class Memory:
-    """Memory m_j of each wave in the body: shape (waves, terms)."""
+    """Memory m_j of the body for each wave, shape (waves, terms)."""
 
     def __init__(self, rings: Rings, material: Prony) -> None:
         """Start with the memory of a body at first contact."""
@@ -238,7 +239,7 @@ class Memory:
         self.shares = np.ones((rings.waves.kx.size, self.times.size), complex)
 
     def slide_for_ever(self, velocity: tuple[float, float]) -> None:
-        """Set the memory of steady sliding."""
+        """Set the memory to its values in steady sliding at a velocity [m/s]."""
         self.shares = self._steady(self._frequency(velocity))
 
     def moduli(self, velocity: tuple[float, float], instants: Array) -> ComplexArray:
@@ -251,7 +252,7 @@ class Memory:
         return np.asarray(self.spring + steady @ self.terms + fading)
 
     def slide(self, velocity: tuple[float, float], duration: float) -> None:
-        """Advance by sliding for a duration [s]."""
+        """Advance the memory by sliding for a duration [s]."""
         omega = self._frequency(velocity)[:, None]
         steady = self._steady(omega[:, 0])
         self.shares = steady + (self.shares - steady) * np.exp(-duration / self.times - 1j * duration * omega)
@@ -265,7 +266,7 @@ class Memory:
 
 
 def follow(memory: Memory, legs: Iterable[SlidingLeg], gamma: float = GAMMA) -> Iterator[TheoryOutcome]:
-    """Yield the outcome of each leg, one after the other; `memory` is advanced."""
+    """Yield the results for each part of a history, one after the other; `memory` is advanced."""
     for leg in legs:
         count = max(1, CHUNK // max(1, len(memory.shares)))
         starts = range(0, max(1, leg.instants.size), count)

@@ -72,7 +72,7 @@ def gap(
 def mean_gap(
     mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
-    """Return the mean gap over one wave [m], Delta (1 - s + s ln s)."""
+    """Return the mean gap over one wave [m], Delta (1 - s + s ln s) with s = p/p*."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     s = np.clip(load, np.finfo(float).tiny, 1)
     return amplitude * (1 - s + s * np.log(s))

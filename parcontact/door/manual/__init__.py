@@ -1,1 +1,1 @@
-"""The manual."""
+"""The manual: its pages, and their texts for a terminal."""

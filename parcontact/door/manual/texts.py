@@ -4,8 +4,8 @@ A line `% written here: NAME` in a page is replaced by text that the program mak
 keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and texts of the caller, such as the options
 of the verbs.
 
-The page on Python is made from docstrings, by the directives by which Sphinx makes the page of the web site:
-`.. autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`. The reference of the keys of a job is made from the types.
+The page on Python is made from docstrings, by the same directives from which Sphinx makes the page of the web site: `..
+autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`. The reference of the keys of a job is made from the types.
 Paragraphs, lists and tables fit the width of the terminal; code stays as it is.
 """
 
@@ -37,7 +37,7 @@ DIRECTIVE = re.compile(r"^\.\. auto(?:class|function):: (\S+)\n(?:   :members:(.
 
 
 def written(page: str) -> str:
-    """A page with headings and docstrings for its blocks of directives."""
+    """Return a page on Python in which headings and docstrings replace its blocks of directives."""
     return BLOCK.sub(lambda block: "\n\n".join(_entries(block.group(1))), page)
 
 
@@ -88,18 +88,18 @@ MEANINGS = Path(__file__).parent / "keys.yaml"
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """Return `[meaning, example]` by the names of the parts, then of their keys."""
+    """Return `[meaning, example]` for each key of a job, by the names of the part and of the key."""
     found: dict[str, dict[str, Any]] = yaml.safe_load(MEANINGS.read_text(encoding="utf-8"))
     return found
 
 
 def keys() -> str:
-    """All sections of a job and their keys, as Markdown."""
+    """Return all sections of a job and their keys, as Markdown."""
     return "\n".join(line for section in schema.sections() for line in _section(section))
 
 
 def heading(section: SectionSchema) -> str:
-    """Return the name of a section: its place in a job, and its kind where there are several."""
+    """Return the name of a section: its place in a job, and its kind if there are several kinds."""
     kind = kind_key(section.part)
     named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
     more = section.part.label.removeprefix(named.replace(":", "")).strip()
@@ -232,7 +232,7 @@ def page_title(name: str) -> str:
 
 
 def page(name: str, writers: Writers | None = None) -> str:
-    """Return a page in full, as MyST Markdown. Raises InputError for a name that no page has."""
+    """Return a page in full, as MyST Markdown. Raises InputError for an unknown name."""
     if name not in page_names():
         close = difflib.get_close_matches(name, page_names(), n=1)
         hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(page_names())}"
