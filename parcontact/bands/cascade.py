@@ -13,9 +13,9 @@ it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks
 Contacts of the present point of a friction curve are stored in a file, so that a killed run continues within this
 point.
 
-A line of the file has a digest of all input of a contact, and the numbers of the contact, which are read back exactly,
-so that repeated passes find the same states without a solve. An incomplete line is ignored. Marches of `road_history`
-are stored in the same way.
+The first line of the file names the program. Any other line has a digest of all input of a contact, and the numbers of
+the contact, which are read back exactly, so that repeated passes find the same states without a solve. An incomplete
+line is ignored. Marches of `road_history` are stored in the same way.
 """
 
 import hashlib
@@ -28,16 +28,17 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from .. import __version__
 from ..contact.constraint import Box, Constraint, InterfaceLaw
 from ..errors import InputError, RunError
 from ..files import hdf5
+from ..files.provenance import PROGRAM
 from ..job import Job, listing
 from ..parallel.slab import Array, Slab
 from .band import Band, PressureLadder, Rung, Vector, probes_of
 from .choice import Cut
 
 IGNORED = ("title", "steady", "output")  # sections on which no contact depends
+FIRST_LINE = f"{PROGRAM}\n"  # of the file of contacts
 NAME = "bands.part"  # removed with all unfinished files when a curve starts again
 
 
@@ -48,11 +49,11 @@ class ContactStore:
         self._slab, self._job, self._path = slab, "", Path()
         self._known: dict[str, Rung] = {}
 
-    def keep_in(self, directory: Path, job: Job, name: str = NAME) -> None:
-        """Read the contacts in a file of this directory, and store further ones there. Raises RunError if that
-        fails."""
+    def keep_in(self, directory: Path, job: Job, name: str = NAME) -> str:
+        """Read the contacts in a file of this directory, and store further ones there. Return, on root, a sentence on a
+        file of another program, which is removed, or ''. Raises RunError if that fails."""
         self._path = directory / name
-        self._on_root(lambda: self._read(job))
+        return self._on_root(lambda: self._read(job)) or ""
 
     def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:
         """Return the contacts with the given `states`, plain data that identify a contact of the job. `solve` gets the
@@ -74,13 +75,16 @@ class ContactStore:
         if self._path.name:
             self._on_root(lambda: self._path.unlink(missing_ok=True))
 
-    def _read(self, job: Job) -> None:
-        of_job = {name: part for name, part in listing.plain_job(job).items() if name not in IGNORED}
-        self._job = repr((__version__, of_job))
+    def _read(self, job: Job) -> str:
+        self._job = repr({name: part for name, part in listing.plain_job(job).items() if name not in IGNORED})
         if not self._path.exists():
-            return
+            return ""
         with self._path.open("r+b") as file:
-            whole = 0
+            first = file.readline()
+            if first.endswith(b"\n") and first != FIRST_LINE.encode():
+                self._path.unlink()
+                return f"{self._path} is not of {PROGRAM}: what it has is calculated again"
+            whole = len(first) if first.endswith(b"\n") else 0
             for line in file:
                 try:
                     digest, numbers = json.loads(line)
@@ -89,14 +93,15 @@ class ContactStore:
                     break
                 whole += len(line)
             file.truncate(whole)
+        return ""
 
     def _append(self, found: dict[str, Rung]) -> None:
         lines = [json.dumps([digest, _plain(rung)]) for digest, rung in found.items()]
         with self._path.open("a") as file:
-            file.write("".join(f"{line}\n" for line in lines))
+            file.write("".join([*([FIRST_LINE] if not file.tell() else []), *(f"{line}\n" for line in lines)]))
 
-    def _on_root(self, act: Callable[[], None]) -> None:
-        hdf5.write_on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
+    def _on_root(self, act: Callable[[], Any]) -> Any:
+        return hdf5.write_on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
 
 
 def _plain(rung: Rung) -> dict[str, Any]:

@@ -127,9 +127,10 @@ class RoadHistory(RoadSliding):
         elastic = "an elastic body has no friction: what rows have is that of the mesh, and has no stated error"
         return [*super().notes(), *([said] if 0.0 < left < slowest else []), *([] if self.loses else [elastic])]
 
-    def keep_in(self, directory: Path) -> None:
-        """Store marches in a file of this directory until `forget` is called; raises RunError."""
-        self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
+    def keep_in(self, directory: Path) -> str:
+        """Store marches in a file of this directory until `forget` is called; return a sentence on a file of another
+        program, or ''. Raises RunError."""
+        return self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
         """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""

@@ -128,9 +128,10 @@ class RoadSliding:
         """Return sentences on the chosen bands."""
         return describe_cut(self.cut, self.job)
 
-    def keep_in(self, directory: Path) -> None:
-        """Store contacts in a file of this directory until their point of the curve is written; raises RunError."""
-        self._cascade.store.keep_in(directory, self.job)
+    def keep_in(self, directory: Path) -> str:
+        """Store contacts in a file of this directory until their point of the curve is written. Return a sentence on a
+        file of another program, or ''. Raises RunError."""
+        return self._cascade.store.keep_in(directory, self.job)
 
     def forget(self) -> None:
         """Remove the stored contacts of the last point."""

@@ -137,9 +137,8 @@ class _Run:
             f"{self.job.title or self.job.path.stem}: {self._ends[-1]} march{'es' * (self._ends[-1] > 1)} of "
             f"{road.cut.count} band{'s' * (road.cut.count > 1)} on {ranks}"
         )
-        for text in self.road.notes():
+        for text in filter(None, (*self.road.notes(), self.road.keep_in(self.directory.path))):
             self._say(text)
-        self.road.keep_in(self.directory.path)
         try:
             with watching(self.directory, self.job.checkpoint, self.options) as self.watch:
                 self.road.march(self._after)

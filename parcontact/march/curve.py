@@ -301,7 +301,7 @@ class States(Protocol):
 
     `table` is the name of an additional table with its columns, or None; `rows` returns its lines for the last state at
     a velocity [m/s]. After `keep_in(directory)` intermediate results may be stored there, until `forget` is called when
-    the state is written.
+    the state is written; it returns a sentence on those of another program, or ''.
     """
 
     setup: Setup
@@ -311,7 +311,7 @@ class States(Protocol):
 
     def notes(self) -> list[str]: ...
 
-    def keep_in(self, directory: Path) -> None: ...
+    def keep_in(self, directory: Path) -> str: ...
 
     def forget(self) -> None: ...
 
@@ -380,7 +380,9 @@ def run_curve(
                 table.say(text)
             table.warn(doubts, options.shows)
         maps = _maps(job, slab, wanted, directory)
-        sliding.keep_in(directory.path)
+        renewed = sliding.keep_in(directory.path)
+        if table and renewed:
+            table.say(renewed)
         try:
             with watching(directory, job.checkpoint, options) as watch:
                 return _Curve(sliding, wanted, table, maps, directory, watch, options.shows).go(draw)

@@ -165,8 +165,9 @@ class SteadySliding:
     def notes(self) -> list[str]:
         return []
 
-    def keep_in(self, directory: Path) -> None:
+    def keep_in(self, directory: Path) -> str:
         """Do nothing: a point is one solve, without intermediate results."""
+        return ""
 
     def forget(self) -> None:
         """Do nothing: no intermediate results are stored."""

@@ -227,7 +227,7 @@ def _saved_states(found: Results) -> Iterator[str]:
 
 def _marches(found: Results) -> Iterator[str]:
     with (found.path / outputs.MARCHES).open("rb") as file:
-        count = sum(1 for _ in file)
+        count = sum(1 for _ in file) - 1  # the first line names the program
     yield f"  run in bands: not finished; finished marches: {count}"
 
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands import band, road_history
+from parcontact.bands import band, cascade, road_history
 from parcontact.bands.band import Band
 from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
@@ -237,3 +237,7 @@ def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert [stage.seconds for stage in job.history] == [0.0, 1e-3]
     assert main(["job.yaml", "--quiet", "--restart", "never", "--wall", "00:00:01"]) == 3
     assert "not finished; finished marches: 1" in info.describe_path(Path("out/job"))[0]
+    monkeypatch.setattr(cascade, "FIRST_LINE", "parcontact 0.0.0\n")
+    assert main(["job.yaml", "--quiet", "--wall", "00:00:01"]) == 3
+    assert "marches.json is not of parcontact" in Path("out/job/run.log").read_text()
+    assert "finished marches: 1" in info.describe_path(Path("out/job"))[0]
