@@ -24,7 +24,9 @@ from .surfaces import (
     Cone,
     Flat,
     HeightFile,
+    Indenter,
     OnOneMesh,
+    Punch,
     Pyramid,
     Rough,
     RoughSpectrum,
@@ -142,18 +144,27 @@ def _mean(stage: Stage, load: float, grid: Grid) -> float:
 
 WARN_STRAIN_IN_TIME = Kind(
     "strain in time",
-    "a mean pressure of {pressure:.3g} Pa, held for {seconds:.3g} s, exceeds 2 G/(1 - nu) = {modulus:.3g} Pa of "
+    "a mean pressure of {pressure:.3g} Pa{where}, held for {seconds:.3g} s, exceeds 2 G/(1 - nu) = {modulus:.3g} Pa of "
     "the relaxed body, where strains are far beyond linear theory; are pressures and moduli both in Pa?",
 )
 WARN_STRAIN_AT_ONCE = Kind(
     "strain at once",
-    "a mean pressure of {pressure:.3g} Pa exceeds 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are far beyond "
+    "a mean pressure of {pressure:.3g} Pa{where} exceeds 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are far beyond "
     "linear theory; are pressures and moduli both in Pa?",
 )
 
 
+def _bearing_share(job: Sections) -> float:
+    """Return the share of the box that bears the load: the face of a single punch, whose edge may be as steep as the
+    edge of the sharp punch in linear theory; else 1."""
+    grid, punch = job.grid, job.surface[0]
+    if len(job.surface) > 1 or not isinstance(punch, Punch) or grid.ny == 1:
+        return 1.0
+    return min(1.0, math.pi * punch.radius**2 / (grid.lx * grid.ly))
+
+
 def _pressures(job: Sections) -> Iterator[Doubt]:
-    material = job.material.fitted
+    material, share = job.material.fitted, _bearing_share(job)
     loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
     loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
@@ -161,11 +172,16 @@ def _pressures(job: Sections) -> Iterator[Doubt]:
         ends = [_mean(stage, load, job.grid) for load in (stage.load.lowest, stage.load.highest)]
         least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
         loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
-    found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
+    found = [
+        (load / share / modulus_after(material, seconds), key, load / share, seconds) for key, load, seconds in loads
+    ]
     strain, key, pressure, seconds = max(found)
     if strain > STRAIN:
-        kind = WARN_STRAIN_IN_TIME if seconds else WARN_STRAIN_AT_ONCE
-        yield kind(key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds})
+        kind, where = (
+            WARN_STRAIN_IN_TIME if seconds else WARN_STRAIN_AT_ONCE,
+            " on the face of the punch" * (share < 1.0),
+        )
+        yield kind(key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds, "where": where})
     yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
 
 
@@ -256,6 +272,25 @@ def _band(job: Sections) -> Iterator[Doubt]:
 # -- isolated contacts ------------------------------------------------------------------------------------------------
 
 
+WARN_CENTRE_OUTSIDE = Kind(
+    "centre outside",
+    "its centre at {axis} = {at:g} m is outside the free box, which ends at 0 and {length:g} m and cuts contact off: "
+    "put center into the box",
+)
+
+
+def _outside(job: Sections) -> Iterator[Doubt]:
+    """Yield a warning for each indenter whose centre is outside a free box."""
+    ends = list(zip("xy", job.grid.size, job.grid.cyclic, strict=True))
+    for index, shape in enumerate(job.surface):
+        if not isinstance(shape, Indenter) or shape.center is None:
+            continue
+        along = "x" if job.grid.ny == 1 else {"x": "y", "y": "x"}.get(getattr(shape, "axis", ""), "xy")
+        for at, (axis, length, cyclic) in zip(shape.center, ends, strict=True):
+            if axis in along and not cyclic and not 0.0 <= at <= length:
+                yield WARN_CENTRE_OUTSIDE(f"surface.{index}", {"axis": axis, "at": at, "length": length})
+
+
 WARN_LARGE_CONTACT = Kind(
     "large contact",
     "the contact would have a radius of {contact:.3g} m or more, above the radius of the sphere, {radius:g} m; the "
@@ -283,6 +318,8 @@ def _room(job: Sections) -> Iterator[Doubt]:
     if not single or any(grid.cyclic):
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
+    if not (0.0 <= x <= grid.lx and 0.0 <= y <= grid.ly):
+        return  # `_outside` warns
     modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
     for index, stage in enumerate(job.history):
         elapsed += stage.seconds
@@ -534,5 +571,5 @@ def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_room, neighbours, _layer, doubt_needs),
+    *(_outside, _room, neighbours, _layer, doubt_needs),
 )

@@ -329,6 +329,31 @@ def test_a_contact_that_creeps_out_of_its_box() -> None:
         assert all(word in text for word in words for text in texts)
 
 
+@pytest.mark.parametrize(
+    ("shape", "center", "axes"),
+    [
+        ({"shape": "cone", "slope": 0.1}, [0.01, 1e-3], "x"),
+        ({"shape": "sphere", "radius": 1e-2}, [-1e-3, 2e-3], "xy"),
+        ({"shape": "cylinder", "radius": 1e-2, "axis": "y"}, [1e-3, 0.01], ""),
+        ({"shape": "punch", "radius": 1e-4, "edge": 1e-4}, [1.5e-3, 0.0], ""),
+    ],
+)
+def test_a_centre_outside_a_free_box(shape: Json, center: list[float], axes: str) -> None:
+    """A periodic box has no outside, and a cylinder no place along its axis."""
+    for grid in (FREE, {**FREE, "boundary": "periodic"}):
+        doubts = job_of({**shape, "center": center}, [{"force": 1e-5}], grid=grid).doubts
+        said = [str(doubt) for doubt in doubts if "edge of the box" in str(doubt) or "outside" in str(doubt)]
+        assert ["".join(re.findall("centre at ([xy])", text)) for text in said] == (list(axes) if grid is FREE else [])
+
+
+def test_strains_below_a_punch_are_those_of_its_face() -> None:
+    """E* = 4 MPa on a face of 3.1e-8 m^2 bears 0.126 N; the box of 2.25e-6 m^2 would bear 9 N."""
+    punch = {"shape": "punch", "radius": 1e-4, "edge": 1e-6}
+    for force, stated in ((0.12, False), (0.13, True)):
+        said = " ".join(job_of(punch, [{"force": force}], grid=FREE).warnings)
+        assert ("Pa on the face of the punch exceeds 2 G/(1 - nu) = 4e+06 Pa" in said) == stated
+
+
 def test_a_contact_that_swings_out_of_its_box() -> None:
     """A velocity V cos(2 pi f t) moves the contact by V/(2 pi f) to each side, and back by the end of the stage."""
     grid = {"points": 16, "size": 1.2e-2, "boundary": "free"}
