@@ -4,8 +4,9 @@ The package of a folder may state `SECTION`, the section of a job that turns it 
 `effect.py`, and columns (`stated`). Other folders of the program find what its further modules contain by `offers`, and
 so name no capability. `GIVES` and `USES` name quantities of a step that an effect computes for other effects, and that
 it needs from them: effects that give something act before those that use it. With `MATERIAL = True` the section is a
-material, which may include a file. `CHANGES_STEPS` names the keys that change steps which a run has completed, if these
-are not all keys of the section. `STAGE_KEYS` are the keys that a section adds to stages.
+material, which may include a file; with `IN_SCENE = True` all jobs of a directory have the same section.
+`CHANGES_STEPS` names the keys that change steps which a run has completed, if these are not all keys of the section.
+`STAGE_KEYS` are the keys that a section adds to stages.
 """
 
 from collections.abc import Collection, Mapping

@@ -29,17 +29,18 @@ M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on 
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ..parallel.slab import Array, reused
+from ..parallel.slab import Array, Slab, reused
 from ..physics import loops
-from ..physics.halfspace import LongWaves
 from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Iterate, certify, form_iterate
 from .constraint import scale_to_load
-from .preconditioner import ALL, ExtendedPreconditioner, Grids, LongWavePreconditioner
+from .preconditioner import ALL, ExtendedPreconditioner, Grids
 from .problem import Contact, Problem, Workspace
 
 # tuning
@@ -48,7 +49,7 @@ MAX_STALLED_IN_SINGLE = 12  # the same with displacements in single precision; d
 MAX_HALVINGS = 12  # limit on halvings of a step that raises f; the last one is accepted
 STEP = 0.95  # fixed step at small contact areas; it tends to 1 in full contact
 MAX_STEP_RATIO = 1.25  # limit on exact step/step made and its inverse; beyond it all further steps are exact
-MAX_STEP_RATIO_FREE = 2.0  # the same in a free box and on layers, where K is less close to the inverse
+MAX_STEP_RATIO_FREE = 2.0  # the same in a free box, or with a `further` preconditioner: K is less close to the inverse
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # iterations without a smaller certificate after which steps are exact
 LEAST_DESCENT = 0.5  # least slope along t over that along z; below it the last direction is forgotten
 REACH = 4.0  # largest change of a pressure in one step, over the highest admissible pressure
@@ -64,8 +65,8 @@ class ContactSolver:
 
     Parameters: `workspace`, the maps for all its intermediate results; `height` of the surface, from its lowest to its
     highest point [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the
-    extension of residuals (`preconditioner.grids_for`); `free`, True for a box that does not repeat; `long_waves`, the
-    compliance of a layer, for which K is too soft.
+    extension of residuals (`preconditioner.grids_for`); `free`, True for a box that does not repeat; `further`, which
+    makes a preconditioner from that of a half space (`physics.halfspace.Response.preconditioner`).
     """
 
     def __init__(
@@ -76,16 +77,14 @@ class ContactSolver:
         max_iterations: int,
         grids: Grids = ALL,
         free: bool = False,
-        long_waves: LongWaves | None = None,
+        further: Callable[[Slab, ExtendedPreconditioner], Any] | None = None,
     ) -> None:
         self.workspace, self.slab = workspace, workspace.slab
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         extended = ExtendedPreconditioner(self.slab, larger=grids)
-        self._extended: ExtendedPreconditioner | LongWavePreconditioner = extended
         self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is far from the inverse
-        if long_waves is not None and not self._rough_inverse:
-            self._extended = LongWavePreconditioner(self.slab, long_waves, extended)
-        self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
+        self._extended = extended if further is None or self._rough_inverse else further(self.slab, extended)
+        self._most_ratio = MAX_STEP_RATIO_FREE if free or further is not None else MAX_STEP_RATIO
 
     def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
         """Solve a contact problem from the admissible pressure `start`, which is overwritten by the solution;

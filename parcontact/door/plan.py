@@ -29,9 +29,7 @@ from .memory import Trial, try_job, warm_up
 SUMS_PER_STEP = 1  # sums over ranks per step outside of the march, to decide whether to stop
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
 LARGE = 1e10  # least size that is printed in GB [bytes]
-OF_STEADY_STATES = (
-    *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
-)
+OF_STEADY_STATES = ("viscoelasticity", "isolated contact", "surface spectrum", "preconditioner in single precision")
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"
 STEADY_START, STEADY_STATES = "steady start, before", "steady states"

@@ -285,9 +285,10 @@ class Effect(Protocol[Memory]):
     `stage`, a class of stages with further keys. Optional functions of a job: `doubts` and `facts` yield warnings
     (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` yields sentences on the waves of a
     surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes. `changed_material` returns a
-    material that replaces the job's. `why_no_curve` and `why_no_theory` return the reason why a job has no friction
-    curve, or no prediction by Persson's theory, and `why_not_folded` why all branches need maps. `curve_options` yields
-    the requirements of the effect's columns of friction curves (`Column.when`).
+    material that replaces the job's. `response`, also from a unit of length [m], returns the response of another body
+    than a half space (`physics.halfspace.Response`). `why_no_curve` and `why_no_theory` return the reason why a job has
+    no friction curve, or no prediction by Persson's theory, and `why_not_folded` why all branches need maps.
+    `curve_options` yields the requirements of the effect's columns of friction curves (`Column.when`).
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job
@@ -382,12 +383,12 @@ class Effect(Protocol[Memory]):
 
     def follow(self, instant: Instant, memory: Memory) -> Changes[Memory]:
         """Return the changes that the effect makes after a step."""
-        ...
+        return Changes(memory)
 
     def values(self, memory: Memory) -> Sequence[float]:
         """Return the values of the effect's columns for the last step, equal on all ranks; NaN: an empty cell.
         Local."""
-        ...
+        return ()
 
     def field(self, memory: Memory, name: str) -> Array:
         """Return this rank's rows of the map `name` of the effect in SI units, as a new array."""

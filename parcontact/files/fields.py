@@ -288,10 +288,10 @@ def _found(path: Path, slab: Slab) -> tuple[SavedMaps | None, str]:
 def xdmf(
     file: str, times: Array, steps: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]
 ) -> str:
-    """Return the XDMF text of the saved instants: maps of one layer of points in the plane z = 0.
+    """Return the XDMF text of the saved instants: maps of one sheet of points in the plane z = 0.
 
     XDMF orders axes z, y, x with x fastest. ParaView puts two-dimensional meshes into the y-z plane, so a
-    three-dimensional mesh of one layer is used. Readers show one map per time: if instants have equal times, as loads
+    three-dimensional mesh of one sheet is used. Readers show one map per time: if instants have equal times, as loads
     without duration do, step numbers are used as times.
     """
     (ny, nx), (lx, ly) = shape, size

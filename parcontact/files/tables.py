@@ -113,12 +113,11 @@ def read_columns(path: Path) -> Columns:
 MARKER = ".parcontact"
 FORMAT = 1
 # sections in which all jobs of a directory must agree
-_MATERIALS = [one.SECTION for one in folders() if hasattr(one, "MATERIAL")]
-SCENE = ("grid", "bands", "surface", "material", "body", *_MATERIALS)
+SCENE = ("grid", "bands", "surface", "material", *(one.SECTION for one in folders() if hasattr(one, "IN_SCENE")))
 SHOWN = 4  # most differences of two jobs in a message
 _ADDED = {one.SECTION: one for one in folders() if hasattr(one, "SECTION")}
 # sections and keys of effects that change completed steps
-EFFECTS = tuple(key for name, one in _ADDED.items() for key in getattr(one, "CHANGES_STEPS", (name,)))
+EFFECTS = tuple(key for one in _ADDED if one not in SCENE for key in getattr(_ADDED[one], "CHANGES_STEPS", (one,)))
 SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a job that a marker keeps
 
 

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..doubts import Doubt, Kind
 from ..printed import per_cent
-from .calculation import Accuracy, Body, Grid, Numerics, Output
+from .calculation import Accuracy, Grid, Numerics, Output
 from .materials import AnyMaterial
 from .parts import Origin
 from .stages import AUTO, GeometricStep, Initial, Stage, Steady
@@ -44,7 +44,6 @@ class Sections(Protocol):
     numerics: Numerics
     output: Output
     steady: Steady | None
-    body: Body | None
 
     @property
     def origin(self) -> Origin:

@@ -1,4 +1,4 @@
-"""Sections of a job on the calculation: `grid`, `body`, `numerics`, `output`, `checkpoint`, `study`, `bands`, `shift`.
+"""Sections of a job on the calculation: `grid`, `numerics`, `output`, `checkpoint`, `study`, `bands`, `shift`.
 
 Solver, folded branches, time steps and mesh have shares in the requested accuracy.
 
@@ -123,13 +123,6 @@ class Grid(Part):
     def dy(self) -> float:
         """Length of a cell along y [m]."""
         return self.ly / self.ny
-
-
-class Body(Part):
-    """A layer, bonded to a rigid base or sliding on it without friction; without this section a half space."""
-
-    thickness: Positive = Field(description="a positive thickness [m]")
-    base: Literal["bonded", "smooth"] = "bonded"
 
 
 TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: tolerance and branch_error, over numerics.accuracy
@@ -338,14 +331,9 @@ def _choose(value: Any, info: ValidationInfo) -> Bands | Auto:
 SomeBands = Annotated[Bands | Auto, PlainValidator(_choose, json_schema_input_type=Bands | Auto)]
 
 
-def _without(name: str, why: str) -> Rule:
-    """Return the rule that a job with bands does not have a section."""
-
-    def check(bands: Any, section: Any) -> Iterator[Fault]:
-        if bands is not None and section:
-            yield Fault(f"cannot be used with bands: {why}", (name,))
-
-    return Rule(("bands", name), check)
+def _no_study(bands: Any, study: Any) -> Iterator[Fault]:
+    if bands is not None and study:
+        yield Fault("cannot be used with bands: a study refines one grid", ("study",))
 
 
 def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[Fault]:
@@ -378,11 +366,7 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
         yield Fault("cannot be used with bands: the work on finer bands is in no band", ("output", "energy"))
 
 
-BAND_RULES = (
-    *rules_of(_over_time),
-    _without("body", "a layer changes the coarsest waves only; give it a grid"),
-    _without("study", "a study refines one grid"),
-)
+BAND_RULES = rules_of(_over_time, _no_study)
 
 
 LOWEST, HIGHEST = -273.15, 5000.0  # physics: range of temperatures [deg C]

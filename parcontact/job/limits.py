@@ -9,9 +9,8 @@ from operator import itemgetter
 from typing import Any
 
 from ..errors import InputError
-from ..printed import rounded_up
 from .advice import SAME_LENGTH, doubt_size, has_wave, one_cell
-from .calculation import FIELDS_NEED, Body, Grid, Numerics, Output, Study
+from .calculation import FIELDS_NEED, Grid, Numerics, Output, Study
 from .materials import AnyMaterial, heated
 from .parts import Rule, rules_of
 from .stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
@@ -20,7 +19,6 @@ from .yaml_text import Fault
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
 BY_SPECTRUM = Rough | RoughSpectrum | Flat
-THINNEST = 1e-9  # rounding: least thickness of a layer over the longer side of its box
 MOST_STEPS = 10**8  # tuning: most steps of a history; at 1 ms each they take more than a day
 
 
@@ -35,34 +33,9 @@ def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
         yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
 
-def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-    """Yield an error if a box that is free along y only has a layer or steady sliding."""
-    asked = {"a layer (body)": body is not None, "steady sliding": steady is not None or initial.state == "steady"}
-    for what in (what for what, given in asked.items() if given):
-        yield from no_strip(what, grid)
-
-
-def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
-    if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
-        least = 2 * max(grid.dx, grid.dy)
-        sentence = (
-            f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free, got {body.thickness:g}"
-        )
-        yield Fault(sentence, ("body", "thickness"))
-
-
-def layer_is_in_proportion(grid: Grid, body: Body | None) -> Iterator[Fault]:
-    """Yield an error if a layer is so thin that its compliance underflows."""
-    if body is not None and body.thickness < THINNEST * max(grid.size):
-        sentence = (
-            f"must be at least {THINNEST:g} of the box, {THINNEST * max(grid.size):.3g} m, got {body.thickness:g}"
-        )
-        yield Fault(sentence, ("body", "thickness"))
-
-
-def no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-    if body is not None and grid.boundary == "free" and (initial.state == "steady" or steady is not None):
-        yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
+def no_steady_strip(grid: Grid, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    if steady is not None or initial.state == "steady":
+        yield from no_strip("steady sliding", grid)
 
 
 def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
@@ -204,20 +177,27 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
 
 
 def steady_bodies_do_not_flow(
-    grid: Grid, material: AnyMaterial, body: Body | None, initial: Initial, steady: Steady | None
+    grid: Grid, material: AnyMaterial, initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Yield an error if a body without long-term modulus has no steady state.
+    """Yield an error if a half space without long-term modulus has no steady state.
 
     Such a body flows under waves that do not vary along the sliding, so that it has a steady state only on a periodic
     line of points in the sliding direction.
     """
+    line = grid.boundary != "free" and min(grid.points) == 1
+    yield from refuse_flow(material, initial, steady, grid.points if line else ())
+
+
+def refuse_flow(
+    material: AnyMaterial, initial: Initial, steady: Steady | None, line: tuple[int, ...] = ()
+) -> Iterator[Fault]:
+    """Refuse steady sliding of a body without long-term modulus, except along a `line` of points (nx, ny)."""
     if material.fitted.long_modulus > 0.0:
         return
     asked = [("initial", initial.velocity)] if initial.state == "steady" else []
     asked += [("steady", steady.unit_direction)] if steady is not None else []
     for key, velocity in asked:
-        moves = [n > 1 and part != 0.0 for n, part in zip(grid.points, velocity, strict=True)]
-        if grid.boundary == "free" or body is not None or not any(moves) or min(grid.points) > 1:
+        if not any(n > 1 and part != 0.0 for n, part in zip(line, velocity, strict=False)):
             sentence = "needs a material with a long-term modulus: this one flows as long as it is pressed"
             yield Fault(f"{sentence}; give it modulus_inf > 0, or slide in a stage of the history", (key,))
 
@@ -340,10 +320,7 @@ def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
 
 RULES = rules_of(
     kernel_fits,
-    layer_is_resolved,
-    layer_is_in_proportion,
-    no_wake_in_a_layer,
-    half_space_at_rest,
+    no_steady_strip,
     waves_are_independent,
     some_shape,
     waves_fit,

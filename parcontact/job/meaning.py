@@ -1,8 +1,7 @@
 """Warnings about the physics of a job, before it runs.
 
-The warnings concern jobs outside of the theory, a linear half space with small slopes and strains, and the thickness of
-a layer, compared with the surface, the mesh and the material. Slopes, heights, pressures and radii are lower bounds, so
-that sound jobs get no warning.
+They are about jobs outside of the theory, a linear half space with small slopes and strains. Slopes, heights, pressures
+and radii are bounded from below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations
@@ -15,14 +14,13 @@ from typing import Any
 from ..doubts import Doubt, Kind
 from ..rubber.shift import doubt_kelvin
 from . import limits
-from .advice import Sections, doubts_of_resolution, more_points
+from .advice import Sections, doubts_of_resolution
 from .calculation import Grid
 from .machine import doubt_needs
 from .materials import Elastic, PronyBranch, Zener
 from .stages import Stage, Swing
 from .surfaces import (
     Cone,
-    Flat,
     HeightFile,
     Indenter,
     OnOneMesh,
@@ -405,7 +403,7 @@ def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Itera
     """
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
-    if not single or not all(grid.cyclic) or job.body is not None:
+    if not single or not all(grid.cyclic) or job.asked("response"):
         return
     around = range(-IMAGES, IMAGES + 1)
     images = math.fsum(math.hypot(i * grid.lx, j * grid.ly) ** -3 for i in around for j in around if i or j)
@@ -480,96 +478,9 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
     return (min(turns), max(turns)) if turns else None
 
 
-THICKEST = 1 / 3  # physics: limit of small strains for the indentation over the thickness of a layer
-FEWEST_CELLS = 2.0  # accuracy: least cells in a thickness, the length over which pressure falls at the edge of contact
-LONGEST = 100.0  # physics: wavelength over thickness above which the compressibility of rubber matters
-NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a body counts as incompressible
-
-
-WARN_THIN = Kind(
-    "thin",
-    "{thickness:g} m is thinner than {least:g} cells of {cell:.3g} m, so edges of contacts are not resolved; use "
-    "{more}, or a smaller grid.size",
-)
-WARN_INCOMPRESSIBLE = Kind(
-    "incompressible",
-    "waves of {wave:.3g} m are more than {times:g} times as long as the layer is thick ({thickness:g} m); rubber "
-    "yields to them by its compressibility, which a Poisson's ratio of {poisson:g} excludes: use 0.4995",
-)
-
-
-def _layer(job: Sections) -> Iterator[Doubt]:
-    """Yield warnings about the `body` section of a job, if it has one."""
-    grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
-    if body is None:
-        return
-    cell = max(grid.dx, grid.dy)
-    smooth = all(isinstance(shape, Wave | Flat) for shape in surface)
-    if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
-        numbers = {"thickness": body.thickness, "least": FEWEST_CELLS, "cell": cell, "more": more_points(grid)}
-        yield WARN_THIN("body.thickness", numbers)
-    yield from doubt_height(2.0 * _rms_height(grid, surface), body.thickness)
-    yield from _indented(surface, body.thickness, job.history)
-    longest = max(_wavelengths(grid, surface), default=0.0)
-    if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
-        numbers = {"wave": longest, "times": LONGEST, "thickness": body.thickness, "poisson": poisson}
-        yield WARN_INCOMPRESSIBLE("material.poisson", numbers)
-
-
-WARN_HIGH_FOR_A_LAYER = Kind(
-    "high for a layer",
-    "the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), so strains are not "
-    "small; use a thicker layer, or a lower surface",
-)
-
-
-def doubt_height(height: float, thickness: float) -> Iterator[Doubt]:
-    """Yield a warning if a surface of this height [m] is too high for a layer of this thickness [m]."""
-    if height > THICKEST * thickness:
-        yield WARN_HIGH_FOR_A_LAYER("body.thickness", {"height": height, "thickness": thickness})
-
-
-WARN_DEEP_FOR_A_LAYER = Kind(
-    "deep for a layer",
-    "{approach:.3g} m is more than a third of the layer ({thickness:g} m), so strains are not small; use a smaller "
-    "approach, or a thicker layer",
-)
-
-
-def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
-    """Yield a warning if the approach of a sphere is too large for the thickness [m]."""
-    if len(surface) != 1 or not isinstance(surface[0], Sphere):
-        return
-    approaches = [(stage.load.highest, index) for index, stage in enumerate(history) if stage.control == "approach"]
-    deepest, index = max(approaches, default=(0.0, 0))
-    if deepest > THICKEST * thickness:
-        numbers = {"approach": deepest, "thickness": thickness}
-        yield WARN_DEEP_FOR_A_LAYER(f"history.{index}.approach", numbers)
-
-
-def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:
-    """Return a lower bound of the rms height [m] of waves and roughness; slopes count for the shortest waves."""
-    square = 0.0
-    for shape in surface:
-        if isinstance(shape, Wave):
-            square += shape.amplitude**2 / 2
-        elif isinstance(shape, Rough):
-            by_slope = (shape.rms_slope or 0.0) * shape.short_wavelength / (2 * math.pi)
-            square += max(shape.rms_height or 0.0, by_slope) ** 2
-    return math.sqrt(square)
-
-
-def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
-    for shape in surface:
-        if isinstance(shape, Wave) and any(shape.waves):
-            yield 1.0 / math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
-        elif isinstance(shape, Rough):
-            yield shape.long_wavelength
-
-
 # tests of a job, in the order of their warnings
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_outside, _room, neighbours, _layer, doubt_needs),
+    *(_outside, _room, neighbours, doubt_needs),
 )

@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_val
 
 from ..doubts import SAID, Doubt
 from . import advice, limits, listing, meaning, surfaces
-from .calculation import BAND_RULES, Body, Checkpoint, Grid, Numerics, Output, SomeBands, Study
+from .calculation import BAND_RULES, Checkpoint, Grid, Numerics, Output, SomeBands, Study
 from .materials import Dma, Material, Zener, describe_temperature, heated
 from .parts import Instead, Origin, Part, Rule
 from .stages import Initial, Stage, Steady
@@ -42,7 +42,6 @@ class Job(Part):
     checkpoint: Checkpoint = Checkpoint()
     steady: Steady | None = None
     study: Study | None = None
-    body: Body | None = None
     bands: SomeBands | None = Field(default=None, description="auto, or a mapping with count, points and waves")
 
     _origin: Origin = PrivateAttr(default=Origin())

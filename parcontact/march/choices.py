@@ -129,12 +129,6 @@ class Choices:
         free = not all(self.grid.cyclic)
         return free, f"the boundary is {listing.text(self.grid.boundary)}" + ": padded" * free
 
-    @decided("layer")
-    def layer(self) -> Verdict:
-        """Decision on a layer instead of the half space: another symbol of the operator, at the same cost."""
-        body = self.job.body
-        return bool(body), f"{body.thickness:g} m, on a {body.base} base" if body else "no body section: a half space"
-
     @decided("yielding counterbody")
     def yielding(self) -> Verdict:
         """Decision to bound pressures by the hardness, by another constraint of the solver."""
@@ -283,7 +277,7 @@ class Choices:
     @property
     def _inverse_is_known(self) -> bool:
         """True if the preconditioner is the inverse of the operator, up to its precision."""
-        return not self.isolated.on and self.numerics.kernel == "spectral" and not self.layer.on
+        return not self.isolated.on and self.numerics.kernel == "spectral" and not self.job.asked("response")
 
     @decided("dissipation per branch")
     def branch_dissipation(self) -> Verdict:

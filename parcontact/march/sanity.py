@@ -111,12 +111,9 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
         seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
         yield from seams
-    body, span = setup.job.body, setup.heights.span
-    if body is not None and setup.roughness and "high for a layer" not in known:
-        yield from meaning.doubt_height(span, body.thickness)
     if setup.roughness and not setup.surface.shapes:
         for doubt_heights in setup.job.asked("doubt_heights"):
-            yield from doubt_heights(setup.job, span)
+            yield from doubt_heights(setup.job, setup.heights.span)
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has further waves
         asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
         yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
@@ -126,8 +123,8 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
 
 
 def has_full_contact(setup: Setup) -> bool:
-    """Return True if the approach has an upper limit: on a periodic half space and on an incompressible layer, whose
-    mean level is fixed, unless the rigid surface yields."""
+    """Return True if the approach has an upper limit: on a periodic body whose mean level is fixed, unless the rigid
+    surface yields."""
     return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
 
 

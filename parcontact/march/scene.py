@@ -30,7 +30,7 @@ from ..physics.body import Body, ElasticBody, ZenerBody, states_errors
 from ..physics.convolution import SIDE, TileConvolution, TileOperator, Tiles
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, Probe, ZenerEnergy
 from ..physics.entries import Units
-from ..physics.halfspace import HalfSpace, Layer
+from ..physics.halfspace import HalfSpace
 from ..physics.motion import PARTS, AlongX, AnyFraction, Motion, Vector
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
@@ -89,10 +89,9 @@ class Setup:
     def half_space(self) -> HalfSpace:
         """The elastic half space of the body with shear modulus 1, in the run's units."""
         poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
-        body = self.job.body
-        layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
+        other = next((response(self.job, self.units.length) for response in self.job.asked("response")), None)
         free, cyclic = self.choices.isolated.on, self.grid.cyclic[0]
-        return HalfSpace(self.size, poisson, kernel, free, layer, cyclic, self.factors)
+        return HalfSpace(self.size, poisson, kernel, free, other, cyclic, self.factors)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """Return a velocity [m/s] in the run's units of length per second."""
@@ -314,11 +313,11 @@ def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) ->
     setup.slab.tally.purpose = "operators"
     operators = _operators(setup, operator_type)
     body, slab = setup.half_space, setup.slab
-    grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.reach)
+    grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.response.reach(body.size))
     setup.slab.tally.purpose = "solver"
     workspace = Workspace(setup.slab, tolerance, operator_type)
-    free = setup.choices.isolated.on
-    return ContactSolver(workspace, height, tolerance, limit, grids, free, body.long_waves), operators
+    further = body.response.preconditioner(body.size)
+    return ContactSolver(workspace, height, tolerance, limit, grids, body.free, further), operators
 
 
 def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:

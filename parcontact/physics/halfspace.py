@@ -1,5 +1,4 @@
-"""Operators of a half space and of a layer, between pressure and normal displacement of the surface, at rest and in
-sliding.
+"""Operators of a half space between pressure and normal displacement of the surface, at rest and in sliding.
 
 An elastic half space of shear modulus 1 under the pressure p moves by the Boussinesq integral (paper, Eq. 1)
 
@@ -7,8 +6,8 @@ An elastic half space of shear modulus 1 under the pressure p moves by the Bouss
 
 For a modulus G divide by G. Lengths have any unit; the unit of displacements is this unit times pressure/modulus. The
 kernel `spectral` uses this symbol; the kernel `love` takes the pressure as constant on each cell (`physics.love`) and
-the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. A layer on a
-rigid base multiplies the symbol by its compliance ratio S.
+the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. Another body
+multiplies the symbol by its compliance ratio (`Response`).
 
 A pressure wave `exp(i q x)` that moves with the surface at the velocity v loads a point of a viscoelastic body at
 the angular frequency `-q v`, so that in the frame of the surface
@@ -16,30 +15,13 @@ the angular frequency `-q v`, so that in the frame of the surface
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
 The wake of an isolated contact is not periodic: influence coefficients are integrals along the wake (`physics.love`).
-
-The surface of a layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave of the
-wavenumber q by
-
-    u^(q) = (1 - nu)/q S(q d) p^(q).
-
-If the layer is bonded to the base, with kappa = 3 - 4 nu,
-
-    S(x) = (kappa sinh 2x - 2x) / (kappa cosh 2x + 2x^2 + 5 - 12 nu + 8 nu^2),
-
-and if it slides freely along a smooth base,
-
-    S(x) = (cosh 2x - 1) / (sinh 2x + 2x).
-
-A uniform pressure p strains the layer in one direction only, and moves its surface by `p d (1 - 2 nu)/(2 (1 - nu))`: an
-incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms (1951);
-for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -69,127 +51,55 @@ from .love import cell_factor, wake
 from .love import love as love_love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 
-Base = Literal["bonded", "smooth"]
-THICK = 22.0  # accuracy: x above which S(x) - 1 is below rounding
-FAR = 50.0  # accuracy: distance over thickness beyond which displacements are below rounding
-KNOTS_PER_THICKNESS = 16  # accuracy: knots of the spline through the correction; its error is below 1e-6
-NODES = 900  # accuracy: nodes of the integral over wavenumbers, 5 per oscillation of the Bessel function
-SOFTEST_BETWEEN, SOFTEST_TRIED = (1e-3, 1e2), 2000  # tuning: range and number of q d that are searched
-HARDLY_STIFFER = 0.8  # tuning: stiffness ratio of softest to longest waves above which LongWaves are not used
-SERIES_BELOW = 1.0  # accuracy: y below which sinh(y) - y is a series, exact to rounding
-
-
-@dataclass(frozen=True)
-class LongWaves:
-    """Compliance `c0 + c2 q^2` of long waves on a layer, in a box of `size`; lengths have one unit.
-
-    It corrects a preconditioner in which these waves are as soft as the layer's softest wave.
-    """
-
-    c0: float
-    c2: float
-    thickness: float
-    size: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Layer:
-    """A layer of shear modulus 1 and `thickness` [any unit of length] on a rigid base."""
-
-    thickness: float
-    base: Base = "bonded"
-    poisson: float = 0.5
-
-    def compliance_ratio(self, q: Array) -> Array:
-        """Return the compliance ratio S(q d) of the module for wavenumbers q > 0; 0 for q = 0."""
-        x = np.asarray(q * self.thickness, dtype=float)
-        y, decay = 2.0 * x, np.exp(-2.0 * x)  # both are multiplied by 2 exp(-y) against overflow
-        sinh, cosh = -np.expm1(-2.0 * y), 1.0 + decay**2
-        if self.base == "smooth":
-            ratio = np.divide(np.expm1(-y) ** 2, sinh + 2.0 * y * decay, out=np.zeros_like(y), where=y > 0.0)
-            return np.asarray(ratio)
-        nu, kappa = self.poisson, 3.0 - 4.0 * self.poisson
-        beyond = np.where(
-            y < SERIES_BELOW, 2.0 * decay * _sinh_beyond(np.minimum(y, SERIES_BELOW)), sinh - 2 * y * decay
-        )
-        above = kappa * beyond + (kappa - 1.0) * 2.0 * y * decay
-        below = kappa * cosh + 2.0 * decay * (2.0 * x**2 + 5.0 - 12.0 * nu + 8.0 * nu**2)
-        return np.asarray(above / below)
-
-    @property
-    def mean_compliance(self) -> float:
-        """Displacement per unit of uniform pressure."""
-        return self.thickness * (1.0 - 2.0 * self.poisson) / (2.0 * (1.0 - self.poisson))
-
-    @cached_property
-    def softest_wave(self) -> tuple[float, float]:
-        """Wavenumber of the wave for which the layer is softest, and this wave's pressure divided by displacement.
-
-        A compressible layer is softest for the longest waves; an incompressible bonded layer for waves about four times
-        as long as the thickness, as longer waves must push the layer along its base.
-        """
-        q = np.geomspace(*SOFTEST_BETWEEN, SOFTEST_TRIED) / self.thickness
-        stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
-        softest = int(np.argmin(stiffness))
-        return float(q[softest]), float(stiffness[softest])
-
-    def long_waves(self, size: tuple[float, float]) -> LongWaves | None:
-        """Return the compliance of waves in a box that are longer and stiffer than the softest wave; None if they are
-        hardly stiffer, or do not exist.
-
-        The compliance of long waves on a bonded layer is `mean_compliance` plus, to second order in q, `d^3 ((3 - 4
-        nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible layer.
-        """
-        nu, softest, stiffness = self.poisson, *self.softest_wave
-        least = stiffness * self.mean_compliance
-        if self.base == "smooth" or least > HARDLY_STIFFER or softest * max(size) < 2 * np.pi:
-            return None
-        second = (3.0 - 4.0 * nu) / (6.0 * (1.0 - nu)) - (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu) ** 2)
-        c0, c2 = self.mean_compliance / (1.0 - least), self.thickness**3 * second / (1.0 - least) ** 2
-        return LongWaves(c0, c2, self.thickness, size)
-
-    def coefficients(self, x: Array, y: Array, dx: float, dy: float, of_half_space: Array) -> Array:
-        """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.
-
-        `of_half_space` has the displacements of a half space (Love's). The difference is smooth on the scale of the
-        thickness: `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond FAR
-        the difference is taken as 0.
-        """
-        correction = self._correction()
-        mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))
-        for i, weight_x in zip((-0.5, 0.0, 0.5), (1 / 6, 2 / 3, 1 / 6), strict=True):
-            for j, weight_y in zip((-0.5, 0.0, 0.5), (1 / 6, 2 / 3, 1 / 6), strict=True):
-                r = np.hypot(x + i * dx, y + j * dy)
-                mean += weight_x * weight_y * correction(np.minimum(r, FAR * self.thickness))
-        far = np.hypot(x, y) > (FAR - 1.0) * self.thickness
-        return np.where(far, 0.0, of_half_space + dx * dy * mean)
-
-    def _correction(self) -> Callable[[Array], Array]:
-        """Return the difference to the displacement of a half space under a unit force, as a function of
-        the distance."""
-        from scipy.interpolate import make_interp_spline  # slow to import, and for isolated layers only
-        from scipy.special import j0
-
-        nodes, weights = np.polynomial.legendre.leggauss(NODES)
-        q = THICK / self.thickness * (nodes + 1.0) / 2.0
-        strength = weights * THICK / self.thickness / 2.0 * (self.compliance_ratio(q) - 1.0)
-        r = self.thickness * np.linspace(0.0, FAR, int(FAR * KNOTS_PER_THICKNESS) + 1)
-        values = j0(np.outer(r, q)) @ strength * (1.0 - self.poisson) / (2.0 * np.pi)
-        return make_interp_spline(r, values, k=5)
-
-
-def _sinh_beyond(y: Array) -> Array:
-    """Return sinh(y) - y without cancellation, for small y."""
-    term = total = y**3 / 6.0
-    for n in range(5, 25, 2):
-        term = term * y**2 / (n * (n - 1))
-        total = total + term
-    return np.asarray(total)
-
-
 Vector = tuple[float, float]
 LEAST_SYMBOL = 1e-6  # accuracy: least compliance of a wave in a table, over that of a half space
 UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as stiff as the square on average
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """Response of the surface of a body of shear modulus 1 to pressure, here of a half space; effects may return that
+    of another body (`effects.effect.Effect`). Wavenumbers q and lengths have one unit; arrays have any shape."""
+
+    poisson: float = 0.5
+
+    @property
+    def depth(self) -> float:
+        """Thickness of the body."""
+        return math.inf
+
+    @property
+    def mean_compliance(self) -> float:
+        """Displacement per unit of uniform pressure in a periodic box."""
+        return 0.0
+
+    def compliance_ratio(self, q: Array) -> Array | float:
+        """Return the ratio of the displacement under waves of pressure to that of a half space."""
+        return 1.0
+
+    def compliance(self, q: Array) -> Array:
+        """Return the ratio of displacement to pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
+        with np.errstate(divide="ignore"):
+            found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+        found *= self.compliance_ratio(q)
+        return found
+
+    def stiffness(self, q: Array) -> Array:
+        """Return the ratio of pressure to displacement of waves, q > 0, for a preconditioner."""
+        return np.asarray(q / (1.0 - self.poisson))
+
+    def coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
+        """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure, in a free box."""
+        return love_love(x, y, dx, dy, self.poisson)
+
+    def reach(self, size: Vector) -> float:
+        """Return the distance beyond which points in a box hardly interact."""
+        return math.inf
+
+    def preconditioner(self, size: Vector) -> Callable[..., Any] | None:
+        """Return a function that makes a preconditioner from a slab and the `contact.preconditioner` of a half space,
+        for a box in which `stiffness` does not suffice; else None."""
+        return None
 
 
 @dataclass(frozen=True)
@@ -200,63 +110,48 @@ class HalfSpace:
     along x only (`physics.love`). Otherwise the box is periodic, with the `kernel`. The argument `fft` of methods is
     the transform of maps: operators compute in its precision, and symbols have its shape, or the shape of the requested
     rows. A free half space makes a padded transform for each operator. `factors` multiply the storage and the loss
-    modulus of waves in steady sliding, by wavenumber; None for a linear body.
+    modulus of waves in steady sliding, by wavenumber; None for a linear body. `other` is the response of a body that is
+    no half space.
     """
 
     size: Vector
     poisson: float = 0.5
     kernel: Literal["spectral", "love"] = "spectral"
     free: bool = False
-    layer: Layer | None = None
+    other: Response | None = None
     repeats_along_x: bool = False
     factors: Callable[[Array], tuple[Array, Array]] | None = None
 
+    @cached_property
+    def response(self) -> Response:
+        """Response of the body: `other`, or that of a half space."""
+        return self.other or Response(poisson=self.poisson)
+
     @property
     def moves_in_the_mean(self) -> bool:
-        """True if a uniform pressure moves the surface: not on a periodic half space, nor on an
-        incompressible layer."""
-        return self.free or (self.layer is not None and self.layer.mean_compliance > 0.0)
-
-    @property
-    def reach(self) -> float:
-        """Distance beyond which points hardly interact: the thickness of a layer, or half of it if the layer is nearly
-        rigid to long waves."""
-        if self.layer is None:
-            return math.inf
-        return self.layer.thickness * (1.0 if self.long_waves is None else 0.5)
-
-    @property
-    def long_waves(self) -> LongWaves | None:
-        """Compliance of waves longer than a layer's softest wave, for a preconditioner; None without such waves."""
-        return None if self.layer is None else self.layer.long_waves(self.size)
+        """True if a uniform pressure moves the surface: not on a periodic half space, nor on another body that is
+        incompressible."""
+        return self.free or self.response.mean_compliance > 0.0
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return the ratio of displacement to pressure of each wave of a periodic body, `(1 - nu)/|q|` on a half space.
-        A mean pressure moves only layers."""
+        """Return the ratio of displacement to pressure of each wave of a periodic body, `(1 - nu)/|q|` on a half
+        space."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
-        symbol = self.compliance(q)
-        if self.layer is not None:
-            symbol[q == 0.0] = self.layer.mean_compliance
+        symbol = self.response.compliance(q)
+        symbol[q == 0.0] = self.response.mean_compliance
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
-
-    def compliance(self, q: Array) -> Array:
-        """Return the ratio of displacement to pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
-        with np.errstate(divide="ignore"):
-            found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
-        return found if self.layer is None else found * self.layer.compliance_ratio(q)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space, without the kernel.
 
         At q = 0, where a periodic half space has no inverse, the ratio is the value of the smallest wavenumber, which
-        keeps it positive. Waves on a layer that are longer than the softest wave get the stiffness of the softest wave:
-        they would join patches of contact. `contact.preconditioner` accounts for their higher stiffness within patches.
+        keeps it positive.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
-        return self._stiffness(q)
+        return self.response.stiffness(q)
 
     def _mirrored_inverse_symbol(self, cosines: Cosines, rows: slice) -> Spectrum:
         """Return pressure over displacement of each half wave of a free box, `(|q| + UNIFORM/L)/(1 - nu)`. This is
@@ -264,15 +159,7 @@ class HalfSpace:
         symbol = np.empty((len(range(cosines.my)[rows]), cosines.fft.shape[1]), np.complex128)
         for (along_x, along_y), place in zip(cosines.modes, (symbol.real, symbol.imag), strict=True):
             q = np.pi * np.hypot(along_x / self.size[0], along_y[rows] / self.size[1])
-            place[...] = self._stiffness(q + UNIFORM / max(self.size))
-        return symbol
-
-    def _stiffness(self, q: Array) -> Array:
-        """Return pressure over displacement of waves."""
-        symbol = np.asarray(q / (1.0 - self.poisson))
-        if self.layer is not None:
-            softest, stiffness = self.layer.softest_wave
-            symbol = np.where(q < softest, stiffness, symbol / self.layer.compliance_ratio(q))
+            place[...] = self.response.stiffness(q + UNIFORM / max(self.size))
         return symbol
 
     @property
@@ -305,21 +192,16 @@ class HalfSpace:
             if self.repeats_along_x:
                 images = partial(love.strip_coefficients, size=self.size, poisson=self.poisson)
                 return tabulate(padded, self.size, images, even=True, inside=True, symmetric=False)
-            return tabulate(padded, self.size, self._coefficient, self.layer is None, inside=True)
+            return tabulate(padded, self.size, self.response.coefficient, self.other is None, inside=True)
 
         return Convolution(padded, lambda rows: table()[rows].real, fft.dtype, later=True)
-
-    def _coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
-        """Return the displacement of a free body at the distance (x, y) from a cell under unit pressure."""
-        of_half_space = love_love(x, y, dx, dy, self.poisson)
-        return of_half_space if self.layer is None else self.layer.coefficients(x, y, dx, dy, of_half_space)
 
     def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
         """Return the operator from displacement to pressure.
 
         The operator is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and
-        for a layer, it is a preconditioner. In a free box displacements are continued mirrored at the edges, so that
-        they have no jump there.
+        for another body, it is a preconditioner. In a free box displacements are continued mirrored at the edges, so
+        that they have no jump there.
         """
         if self.free and not self.repeats_along_x:
             cosines = Cosines(fft)
@@ -330,12 +212,12 @@ class HalfSpace:
         """Return True if operators on tiles exist: for a half space in a free box whose cells are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
         return (
-            self.free and not self.repeats_along_x and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+            self.free and not self.repeats_along_x and self.other is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
         )
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
         """Return the operator of a free half space on tiles of its grid, and a preconditioner for it."""
-        operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
+        operator = free_operator(tiles, self.size, self.poisson, self.response.coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------
@@ -348,12 +230,12 @@ class HalfSpace:
         free body is replaced by a periodic one with the same influence coefficients up to half the box.
         """
         if self.free:
-            table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
+            table = tabulate(fft, self.size, self.response.coefficient, self.other is None).real
             symbol = table.__getitem__
             owns_mean = fft.columns.start == 0 < fft.columns.stop
             least = mean = fft.slab.sum(float(table[0, 0]) if owns_mean else 0.0)[0]
         else:
-            symbol, mean = partial(self.symbol, fft), 0.0 if self.layer is None else self.layer.mean_compliance
+            symbol, mean = partial(self.symbol, fft), self.response.mean_compliance
             least = mean or self.largest_compliance
 
         def positive(rows: slice, inverted: bool) -> Array:

@@ -23,7 +23,6 @@ from ..job.history import Span, Timeline
 from ..march import scene
 from ..march.curve import Request, request
 from ..parallel.slab import Slab
-from ..physics.halfspace import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..theory import full_contact, persson
@@ -254,11 +253,11 @@ def _lattice(job: Job, slab: Slab) -> Rings:
 
 
 def _on_body(job: Job, rings: Rings) -> Rings:
-    """Return the waves on the body of the job: a layer is stiffer than a half space."""
-    if job.body is None:
-        return rings
-    layer = Layer(job.body.thickness, job.body.base, job.material.poisson)
-    return replace(rings, stiffness=1.0 / layer.compliance_ratio(np.hypot(rings.waves.kx, rings.waves.ky)))
+    """Return the waves on the body of the job, which may be stiffer than a half space."""
+    for response in job.asked("response"):
+        ratio = response(job, 1.0).compliance_ratio(np.hypot(rings.waves.kx, rings.waves.ky))
+        rings = replace(rings, stiffness=1.0 / ratio)
+    return rings
 
 
 def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:

@@ -71,7 +71,7 @@ class Rings:
     """Waves of a surface in rings of equal wavenumber, from the longest; `starts` is the first wave of each ring.
 
     A panel has n rings; `share`, shape (n, n), has for each ring of a panel the shares of all its rings that lie within
-    this ring. `stiffness` is the ratio of the body's stiffness to that of a half space for each wave, for a layer.
+    this ring. `stiffness` is the ratio of the body's stiffness to that of a half space for each wave.
     """
 
     waves: Waves

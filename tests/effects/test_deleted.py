@@ -34,10 +34,11 @@ KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is r
     "interface": ({"interface": {"shear_stress": 1e5}}, "interface is not a known key"),
     "stick": ({"interface": {"shear_stress": 1e5, "stick": True}}, "interface.stick is not a key of interface"),
     "adhesion": ({"adhesion": {"work": 0.05}}, "adhesion is not a known key"),
+    "layer": ({"body": {"thickness": 1e-3}}, "body is not a known key"),
     "softening": ({"softening": {"table": [[1e-3, 1.0, 1.0], [1.0, 0.5, 0.5]]}}, "softening is not a known key"),
 }
 LACKING = {"interface": ("steady",), "softening": ("history",), "adhesion": ("steady",)}  # what a section excludes
-OF_STEADY_STATES = ("heat", "softening", "counterbody")
+OF_STEADY_STATES = ("heat", "softening", "counterbody", "layer")
 CHECKED = ("time", "friction", "contact_area", "mean_gap", "max_pressure", "operator_calls", "error_friction")
 
 

@@ -47,7 +47,7 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
             "allreduce": 10,
         },  # branch, displacement, two increments; at each of 5 steps the embedded pair and both views of friction
     ),
-    "layer": ({"history": [PRESS]}, {"history": [PRESS], "body": {"thickness": 1e-2}}, {}),
+    "body": ({"history": [PRESS]}, {"history": [PRESS], "body": {"thickness": 1e-2}}, {}),
     "folded branches": (
         {"history": [PRESS], "material": FROZEN, "numerics": {"branch_error": 0.0}},
         {"history": [PRESS], "material": FROZEN},

@@ -1,4 +1,4 @@
 """A rough counterbody that deforms, too: both bodies are calculated as one."""
 
 SECTION, EFFECT = "counterbody", "CounterbodyThatDeforms"
-MATERIAL = True  # see `capabilities`
+MATERIAL = IN_SCENE = True  # see `capabilities`

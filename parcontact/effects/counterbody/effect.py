@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Rough
 from ...job.yaml_text import Fault
 from ...physics.prony import complex_modulus
-from ..effect import Changes, Decision, Effect, Instant
+from ..effect import Decision, Effect
 from ..relaxation import relaxation_of
 from .section import Counterbody, Pair
 
@@ -38,12 +38,6 @@ def _slides(counterbody: Any, history: Any, initial: Any, steady: Any) -> Iterat
         yield Fault(f"{sentence}: {AT_REST}; leave out one of them", ("steady",))
     if steady is not None and counterbody.fitted.long_modulus == 0.0:
         yield Fault(f"needs a long-term modulus: {AT_REST}", ("counterbody",))
-
-
-def _lies_on(counterbody: Any, body: Any) -> Iterator[Fault]:
-    if counterbody is not None and body is not None:
-        sentence = "needs a half space: the share of a layer depends on the wavelength"
-        yield Fault(f"{sentence}; leave out body, or counterbody", ("counterbody",))
 
 
 def _sticks(counterbody: Any, material: Any, interface: Any) -> Iterator[Fault]:
@@ -85,7 +79,7 @@ class CounterbodyThatDeforms(Effect[None]):
     in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
     columns: ClassVar[tuple[str, ...]] = ()
-    rules: ClassVar[tuple[Rule, ...]] = rules_of(_slides, _lies_on, _sticks, _no_heat, _no_softening, _does_not_yield)
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_slides, _sticks, _no_heat, _no_softening, _does_not_yield)
 
     @staticmethod
     def changed_material(job: Any) -> Any:
@@ -131,14 +125,6 @@ class CounterbodyThatDeforms(Effect[None]):
         text = f"both bodies as one: shear modulus {series.modulus_inf:.4g} Pa after all relaxation"
         shown = ((value, complex(complex_modulus(2.0 * math.pi * value, *series))) for value in frequencies(job))
         yield "; ".join([text, *(f"{m.real:.4g} + {m.imag:.4g}i Pa at {f:.4g} Hz" for f, m in shown)])
-
-    def __init__(self, scene: Any) -> None: ...
-
-    def follow(self, instant: Instant, memory: None) -> Changes[None]:
-        return Changes(None)
-
-    def values(self, memory: None) -> Sequence[float]:
-        return ()
 
 
 def frequencies(job: Any) -> list[float]:

@@ -42,8 +42,6 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
         law: Interface = job.section("interface")
         return None if law.stick else law.friction(job.material)
 
-    def __init__(self, scene: Any) -> None: ...
-
     def at_rest(self) -> tuple[float, float]:
         return 0.0, 0.0
 

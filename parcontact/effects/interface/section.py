@@ -54,15 +54,12 @@ def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
         )
 
 
-def _sticks(interface: Any, grid: Any, body: Any, initial: Any, steady: Any) -> Iterator[Fault]:
+def _sticks(interface: Any, grid: Any, initial: Any, steady: Any) -> Iterator[Fault]:
     """Refuse what stick is not solved for."""
     if interface is None or not interface.stick:
         return
-    place = ("interface", "stick")
-    if body is not None:
-        yield Fault("needs a half space: pressure on a layer moves its surface sideways; leave out body", place)
     if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
-        yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", place)
+        yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", ("interface", "stick"))
     for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if asked:
             yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))

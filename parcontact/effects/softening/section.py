@@ -86,16 +86,12 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
         yield Fault("cannot be used with softening, as softened moduli are no Prony series", ("initial",))
 
 
-def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) -> Iterator[Fault]:
-    """Yield an error for free boxes and layers, for whose waves the strain is not known."""
-    if softening is None:
-        return
-    if not all(grid.cyclic):
+def in_a_periodic_box(softening: Softening | None, grid: Any) -> Iterator[Fault]:
+    """Yield an error for free boxes, for whose waves the strain is not known."""
+    if softening is not None and not all(grid.cyclic):
         yield Fault(
             "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")
         )
-    if body is not None:
-        yield Fault("cannot be used with softening: strains are those of a half space", ("body",))
 
 
 def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
@@ -113,4 +109,4 @@ def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
         yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
 
 
-RULES = rules_of(only_in_steady_sliding, on_a_periodic_half_space, of_rubber)
+RULES = rules_of(only_in_steady_sliding, in_a_periodic_box, of_rubber)

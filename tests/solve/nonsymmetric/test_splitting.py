@@ -13,11 +13,12 @@ from parcontact.contact.constraint import Box, InterfaceLaw
 from parcontact.contact.problem import Approach, MeanPressure
 from parcontact.contact.projected import Projected
 from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
+from parcontact.effects.layer.response import Layer
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution
-from parcontact.physics.halfspace import HalfSpace, Layer
+from parcontact.physics.halfspace import HalfSpace
 
 Map = NDArray[np.float64]
 
@@ -188,8 +189,8 @@ def test_law_alone() -> None:
 def test_a_layer_moves_in_the_mean(comm: MPI.Intracomm, poisson: float) -> None:
     """Under a load, and under the approach that it gives: the conditions of contact without a law to the tolerance,
     1e-8, of the height, and the same load, to 1e-6, as contact is stiff."""
-    layer = Layer(0.1, "bonded", poisson)
-    splitting, operator = made(1e-8, comm, poisson=poisson, layer=layer)
+    layer = Layer(0.1, "bonded", poisson=poisson)
+    splitting, operator = made(1e-8, comm, poisson=poisson, other=layer)
     slab, mean = splitting.slab, 0.5
     h = HEIGHTS[slab.rows]
     found = splitting.solve(h, MeanPressure(mean), Box(), slab.zeros())

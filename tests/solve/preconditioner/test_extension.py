@@ -6,19 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
-from parcontact.contact.preconditioner import (
-    DECAY,
-    FLOOR,
-    ExtendedPreconditioner,
-    Grids,
-    LongWavePreconditioner,
-    grids_for,
-)
+from parcontact.contact.preconditioner import FLOOR, ExtendedPreconditioner, Grids, grids_for
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.halfspace import LongWaves
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -121,78 +111,3 @@ def test_cells_are_no_longer_than_the_reach() -> None:
     assert grids_for(1.0, 4.0, 16.0) == Grids(4, 2)
     assert grids_for(1.0, 1.0, 0.1) == Grids(1, 0)
     assert grids_for(1.0, 17.0, 8.0) == Grids(0)
-
-
-# -- long waves on a thin layer: one V-cycle against a direct solve, its symmetry, any ranks, its memory --------------
-
-SIZE = (1.0, 1.5)
-
-
-class Nothing:
-    """A preconditioner that gives nothing, so that what long waves add is seen alone."""
-
-    def apply(self, field: Array, out: Array) -> Array:
-        out.fill(0.0)
-        return out
-
-
-def waves(thickness: float, squeezed: float) -> LongWaves:
-    """A bonded layer; `squeezed` is c0 over `c2/thickness^2`, 0 if incompressible."""
-    return LongWaves(squeezed * thickness / 3, thickness**3 / 3, thickness, SIZE)
-
-
-def added(comm: MPI.Intracomm, r: Map, contact: NDArray[np.bool_], thickness: float, squeezed: float = 0.0) -> Map:
-    """What is added on this rank's rows, 0 outside contact."""
-    slab = Slab(comm, r.shape[1], r.shape[0])
-    made = LongWavePreconditioner(slab, waves(thickness, squeezed), ExtendedPreconditioner(slab))
-    z = slab.empty()
-    z[...] = r[slab.rows]
-    made.apply(Nothing(), contact[slab.rows].copy(), z)
-    return np.where(contact[slab.rows], z, 0.0)
-
-
-def solved(r: Map, contact: NDArray[np.bool_], thickness: float, squeezed: float) -> Map:
-    """The solution of its equation by finite differences, with `1/L^2` for the longest wave."""
-    (ny, nx), (lx, ly) = r.shape, SIZE
-    number = np.arange(nx * ny).reshape(ny, nx)
-    stiffness = squeezed / thickness**2 + 1.0 / max(SIZE) ** 2
-    matrix = sparse.diags(np.where(contact, 0.0, 1.0 / (DECAY * thickness) ** 2).ravel() + stiffness)
-    for axis, step in ((0, ly / ny), (1, lx / nx)):
-        for shift in (1, -1):
-            there = (np.ones(r.size), (number.ravel(), np.roll(number, shift, axis).ravel()))
-            matrix = matrix + (sparse.identity(r.size) - sparse.csr_matrix(there)) / step**2
-    z = spsolve(matrix.tocsc(), r.ravel()).reshape(r.shape) * 3 / thickness**3
-    return np.where(contact, z, 0.0)
-
-
-def patches(ny: int, nx: int, seed: int = 1) -> tuple[NDArray[np.bool_], Map]:
-    """Contact in a few patches, and a smooth residual in them."""
-    random = np.random.default_rng(seed)
-    spectrum = np.fft.rfft2(random.normal(size=(ny, nx)))
-    q = np.hypot(*np.meshgrid(np.fft.rfftfreq(nx) * nx, np.fft.fftfreq(ny) * ny))
-    smooth = np.fft.irfft2(spectrum * np.exp(-((q / 3) ** 2)), (ny, nx))
-    contact = smooth > np.quantile(smooth, 0.6)
-    return contact, np.where(contact, random.normal() + smooth / smooth.std(), 0.0)
-
-
-@pytest.mark.parametrize(  # cells are smoothed from the finest grid on, and from twice that
-    ("thickness", "squeezed"), [(0.03, 0.0), (0.15, 0.0), (0.15, 1.0)]
-)
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_is_near_the_solution(thickness: float, squeezed: float, seed: int) -> None:
-    """Its energy `<r, z>` is that of the solution within a factor 2, as preconditioners of this kind are."""
-    contact, r = patches(48, 64, seed)
-    z = added(MPI.COMM_SELF, r, contact, thickness, squeezed)
-    ratio = np.sum(r * z) / np.sum(r * solved(r, contact, thickness, squeezed))
-    assert 0.5 < ratio < 2.0
-
-
-@pytest.mark.parametrize("shape", [(48, 64), (33, 18), (50, 7)])
-def test_is_symmetric_and_positive(shape: tuple[int, int]) -> None:
-    """`<r, M s> = <M r, s>`, to single precision."""
-    contact, _ = patches(*shape)
-    random = np.random.default_rng(2)
-    r, s = (np.where(contact, random.normal(size=shape), 0.0) for _ in range(2))
-    m_r, m_s = (added(MPI.COMM_SELF, one, contact, 0.1) for one in (r, s))
-    assert abs(np.sum(r * m_s) - np.sum(m_r * s)) < SINGLE * np.sum(np.abs(m_r * s))
-    assert np.sum(r * m_r) > 0.0

@@ -6,6 +6,9 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
+from parcontact.march.sanity import check_heights
+from parcontact.march.scene import set_up
+from parcontact.parallel.slab import Slab
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2e-4}
 WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}
@@ -42,6 +45,22 @@ def test_a_surface_higher_than_a_third_of_the_layer(surface: Any, height: float)
     assert warnings(3.01 * height, surface) == []
     (text,) = warnings(2.99 * height, surface)
     assert f"the surface is {height:.3g} m high or more" in text
+
+
+@pytest.mark.parametrize(("sphere", "count"), [([], 1), ([{"shape": "sphere", "radius": 1e-2}], 0)])
+def test_heights_that_the_job_does_not_have(sphere: Any, count: int) -> None:
+    """Roughness of which twice the rms height is below a third, but not the whole height; an indenter is not high."""
+    job = Job.model_validate(
+        {
+            "grid": {"points": 64, "size": 1e-3},
+            "surface": [{**ROUGH, "rms_height": 1e-6}, *sphere],
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "history": [{"pressure": 1e3}],
+            "body": {"thickness": 1e-5},
+        }
+    )
+    found = check_heights(set_up(job, Slab.alone(64, 64)))
+    assert [doubt.kind for doubt in (*job.doubts, *found)].count("high for a layer") == count
 
 
 def test_an_indenter_deeper_than_a_third_of_the_layer() -> None:
