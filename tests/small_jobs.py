@@ -14,6 +14,7 @@ from parcontact.job import yaml_text
 from parcontact.march import mesh
 
 POINTS = (12, 16, 24, 32, 48, 64, 96, 128, 160, 256)  # tried one after the other
+MOST_STEPS = 20  # of equal steps of a stage
 PARTS = {"surface", "material"}  # a block of YAML with these and one of LOADS is a whole job
 LOADS = {"history", "steady"}
 PLAIN = {"title", "grid", "surface", "material", "history", "numerics", "output", "checkpoint"}
@@ -65,6 +66,8 @@ def smallest(found: Found, directory: Path) -> Path:
     for points in POINTS if "bands" not in data else (0,):
         if points:
             data["grid"] = {**data["grid"], "points": [points if n > 1 else 1 for n in _pair(data["grid"]["points"])]}
+            if "sweep" in data:
+                data["sweep"] = [_of_points(one, points) for one in _list(data["sweep"])]
         path.write_text(yaml.safe_dump(data, allow_unicode=True))
         try:
             mesh.load_cases(path)
@@ -73,6 +76,12 @@ def smallest(found: Found, directory: Path) -> Path:
             continue
         return path
     raise problem
+
+
+def _of_points(values: Json, points: int) -> Json:
+    """Return values of a sweep with the least number of points of its grids in the place of the first."""
+    grids = values.get("grid.points")
+    return {**values, "grid.points": [points * n // grids[0] for n in grids]} if grids else values
 
 
 def _pair(points: Any) -> list[int]:
@@ -96,13 +105,16 @@ def reduced(data: Json) -> Json:
         found["sweep"] = [{key: _few(value, 2) for key, value in one.items()} for one in _list(found["sweep"])]
     if found.get("bands"):
         found["bands"] = {"samples": 1}
-        found["surface"] = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
-        if found.get("sweep") and not found.get("history"):
-            found["bands"]["count"] = 2
-            found["surface"] = [{**part, "short_wavelength": part["long_wavelength"] / 16} for part in found["surface"]]
+        parts = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
+        decay = 4 if found.get("history") else 16
+        found["surface"] = [
+            {**part, "short_wavelength": part["long_wavelength"] / decay} if "long_wavelength" in part else part
+            for part in parts
+        ]
+        if all("long_wavelength" in part for part in parts):
+            found["bands"] |= {"points": 32, "waves": 2}
+        found["bands"]["count"] = 1 if found.get("sweep") and found.get("history") else 2
         if found.get("history"):
-            found["bands"]["count"] = 1 if found.get("sweep") else 2
-            found["surface"] = [{**part, "short_wavelength": part["long_wavelength"] / 4} for part in found["surface"]]
             found["numerics"]["tolerance"] = 0.02
         if "thermal" in found:
             found["thermal"] = {**found["thermal"], "feedback": "none"}
@@ -120,6 +132,8 @@ def _short(stage: Json) -> Json:
         found["distance"] = found["distance"] / 4
     if isinstance(found.get("cells_per_step"), int | float):
         found["cells_per_step"] = 2
+    if isinstance(found.get("duration"), float) and isinstance(found.get("time_step"), float):
+        found["time_step"] = max(found["time_step"], found["duration"] / MOST_STEPS)
     return found
 
 
