@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Main, RunParcontact
+from conftest import Main
 from numpy.testing import assert_allclose
 from scipy.special import lambertw
 
@@ -94,7 +94,7 @@ def test_bell_of_an_interface_is_shifted_like_the_bulk(tmp_path: Path) -> None:
     assert one.measures.friction == pytest.approx(other.measures.friction, rel=1e-10)
 
 
-def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: RunParcontact) -> None:
+def test_table_theory_and_picture(tmp_path: Path, main: Main) -> None:
     """A row for each temperature, sorted, also where the curve goes on; theory over the same points; a master curve."""
     changes = ["--set", "numerics.tolerance=1e-6", "--set", "interface={shear_stress: 1.0e4}"]
     (tmp_path / "job.yaml").write_text(ROUGH + PARTS)
@@ -102,8 +102,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     code, _, err = main(*words, "--temperatures=20")
     assert code == 0, err
     before = (tmp_path / "out/steady.csv").read_text().splitlines()[1:]
-    done = run_parcontact([*words, "--temperatures=20,-5,60"], ranks=2)
-    assert done.returncode == 0, done.stderr
+    assert main(*words, "--temperatures=20,-5,60")[0] == 0
     found = read_columns(tmp_path / "out/steady.csv")
     assert found["temperature"] == [-5.0, -5.0, 20.0, 20.0, 60.0, 60.0]
     assert (tmp_path / "out/steady.csv").read_text().splitlines()[3:5] == before
