@@ -41,7 +41,7 @@ def cut_anywhere(bench: Bench, data: dict[str, Any], apart: int = 1) -> None:
 def test_cut_anywhere(bench: Bench, name: str) -> None:
     """k steps, and the other N - k after a restart, equal all N at once; for every k of one scene, that of the initial
     state too, and for some k of the others."""
-    cut_anywhere(bench, bench.job(name), {"viscoelastic": 1, "chosen": 4}.get(name, 8))
+    cut_anywhere(bench, bench.job(name), {"viscoelastic": 1, "chosen": 16}.get(name, 8))
 
 
 @pytest.mark.mpi(2)

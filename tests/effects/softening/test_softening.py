@@ -242,11 +242,7 @@ POWER_LAW = {  # G' ~ omega^0.15, G''/G' = tan(0.15 pi/2)
 
 
 @pytest.mark.parametrize(
-    ("hurst", "slope", "ratio"),
-    [
-        *((0.8, 0.03, 0.950), (0.8, 0.1, 0.698), (0.8, 0.3, 0.484), (0.8, 1.0, 0.343)),
-        *((0.5, 0.03, 0.917), (0.5, 0.1, 0.657), (0.5, 0.3, 0.459), (0.5, 1.0, 0.331)),
-    ],
+    ("hurst", "slope", "ratio"), [*((0.8, 0.03, 0.950), (0.8, 0.3, 0.484)), *((0.5, 0.1, 0.657), (0.5, 1.0, 0.331))]
 )
 def test_bands_in_full_contact(hurst: float, slope: float, ratio: float) -> None:
     """Three decades of waves, slope spectrum q^(2 - 2H), one strain a band: softened over unsoftened friction within
