@@ -7,7 +7,8 @@ much smaller. Each source estimates a relative error from numbers of a step, wit
 solver: for friction proportional to the `complementarity` C of the certificate (`physics.measures`), and smaller for
 many spots. Where friction is far below the slopes, it is a small difference of large forces: errors of pressures then
 count more, by the root of the ratio, and pressures with the error C may have tangential forces of NOISE C times the
-slopes. For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
+slopes. Friction by energy is a sum of squares: it is not known below the square of SINGLE, to which pressures are
+rounded. For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
 
 time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded pair
 (`time_error`). folded: the bound for the branches without a map; for the area times the open share.
@@ -17,8 +18,9 @@ steady sliding with STILL instead of AREA, and at least one cell. For friction i
 between friction by the slopes of the rigid surface and by the slopes of the body. For steady friction, a sum of squares
 without cancellation, the loss at edges in waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts
 have the same position on the grid: their errors do not average out (N = 1), and are larger by IDENTICAL for the area
-and for steady friction. A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of
-friction WAVES (4/cells)^2.5.
+and for steady friction. Edges along an axis of the grid also have one position: c counts as much more where all edges
+follow it, and in proportion where some do. A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with
+a further error of friction WAVES (4/cells)^2.5.
 
 Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
 waves of wavenumber q across the edge falls as q^-3. In steady sliding at the speed v these waves lose power in
@@ -79,6 +81,7 @@ AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
 STRAIGHT_POWER = 0.5  # accuracy: power of m along edges that follow the grid
 GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
 FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
+SINGLE = float(np.finfo(np.float32).eps)  # rounding: relative, of pressures, whose squares are friction by energy
 ROUNDING = 1e-12  # rounding: least complementarity in errors by NOISE, and in steady sliding
 
 
@@ -111,6 +114,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors that the solve of a state of steady sliding causes; its friction is a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
+    friction = max(friction, SINGLE**2 / observed.body if observed.body else 0.0)
     return ErrorPair(friction, _solver_of_area(observed))
 
 
@@ -141,7 +145,7 @@ def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors that the mesh causes in a state of steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
-    friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
+    friction = _grow_if_coherent(run, observed) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
 
 
@@ -154,12 +158,14 @@ def _lacking_waves(run: RunProperties) -> float:
 
 
 def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
-    error = fit.value * _grow_if_identical(run) * observed.correction * mean_over_spots(run, observed)
+    error = fit.value * _grow_if_coherent(run, observed) * observed.correction * mean_over_spots(run, observed)
     return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error
 
 
-def _grow_if_identical(run: RunProperties) -> float:
-    return IDENTICAL.value if run.identical_contacts else 1.0
+def _grow_if_coherent(run: RunProperties, observed: StepObservation) -> float:
+    """Return the factor by which errors grow where edges have the same position on the grid: of identical contacts, and
+    of edges that follow an axis of the grid."""
+    return 1.0 + (IDENTICAL.value - 1.0) * (1.0 if run.identical_contacts else observed.straight)
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:

@@ -167,6 +167,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep, change: float
         interface=measures.friction_interface,
         penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
         spared=measures.spared,
+        straight=measures.straight,
         friction_mismatch=mismatch,
         way=step.velocity,
         slid=_cells_slid(run, step, (grid.dx, grid.dy)),

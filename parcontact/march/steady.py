@@ -254,6 +254,7 @@ def judge_state(
         corrected=measures.contact_area_corrected,
         interface=measures.friction_interface,
         penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
+        straight=measures.straight,
         way=velocity,
     )
     return friction, estimate_steady(replace(known, prony=setup.prony), seen)

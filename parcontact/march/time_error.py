@@ -118,8 +118,8 @@ class StepObservation:
     `complementarity` of the certificate; `penetrating`: number of points that penetrate without pressure, over the
     number in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
     `area`, counted, and `corrected`, as shares; `spared`: correction not made at points on the edge that have yielded;
-    `friction_mismatch`: difference of friction by the slopes of the rigid surface and of the body; `way`: direction of
-    sliding, (0, 0) at rest.
+    `straight`: the edges follow one axis of the grid, 1, or both, 0; `friction_mismatch`: difference of friction by the
+    slopes of the rigid surface and of the body; `way`: direction of sliding, (0, 0) at rest.
 
     For steps also: `difference` of the embedded pair, and its `order`; `slid`: cells (of mean sides) slid in `seconds`;
     `angle` of the pair; `curved`: the displacement is quadratic in time; `change` of friction since the step before,
@@ -135,6 +135,7 @@ class StepObservation:
     interface: float = 0.0
     penetrating: float = 0.0
     spared: float = 0.0
+    straight: float = 0.0
     friction_mismatch: float = 0.0
     way: Vector = (0.0, 0.0)
     difference: float = 0.0

@@ -389,8 +389,9 @@ class Probe:
             p, u, h, touching, regrid.before_first(self.slab, touching, along_y), along_x
         )
         edge = _touches_edge(self.slab, touching, self.surface.periodic)
-        load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
+        load, count, gaps, sides_x, sides_y, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
+        sides = sides_x + sides_y
         excess, least = self._excess * sides, 0.0
         if self.hardness is not None and largest * unit_pressure >= (1.0 - YIELDED) * self.hardness:
             highest = self.hardness / unit_pressure
@@ -424,7 +425,15 @@ class Probe:
             friction_interface=rubbed / normal if presses else 0.0,
             force_interface=rubbed,
             spared=(self._excess * sides - excess) / points,
+            straight=self._straightness(sides_x, sides_y),
         )
+
+    def _straightness(self, sides_x: float, sides_y: float) -> float:
+        """Return how nearly all edges of contact follow one axis of the grid; the numbers of their cell sides are those
+        between neighbours along x and along y."""
+        (lx, ly), slab = self.surface.size, self.slab
+        along_y, along_x = sides_x * ly / slab.ny, sides_y * lx / slab.nx
+        return abs(along_x - along_y) / ((along_x + along_y) or 1.0)
 
     def _measure_yielded(self, p: Array, u: Array, h: Array, highest: float) -> _Yielding:
         """Return the sums for a contact whose pressures end at `highest`, in the unit of p; collective."""

@@ -87,35 +87,37 @@ def commit(displacement, buffer, u, heights, offset, out):
 @loop
 def sum_measures(p, u, h, mask, above, cyclic):
     """Return, over the points of this rank: the sum of p; the number of points in contact, where `mask` is not 0; the
-    sum of `u - h`; the number of cell sides between a point in contact and one that is not; and the largest p.
+    sum of `u - h`; the numbers of cell sides between a point in contact and one that is not, for neighbours along x and
+    along y; and the largest p.
 
     `above` is the row of the mask before the first. With `cyclic`, the last point of a row is the neighbour of the
     first. The largest pressure is kept for each column, so that the loop is vectorized.
     """
-    load, count, gaps, sides = 0.0, 0.0, 0.0, 0.0
+    load, count, gaps, sides_x, sides_y = 0.0, 0.0, 0.0, 0.0, 0.0
     largest, most = np.empty(p.shape[1]), 0.0
     for i in range(largest.size):
         largest[i] = 0.0
     for j in range(p.shape[0]):
         before = mask[j - 1] if j > 0 else above
-        row_load, row_count, row_gaps, across, along = 0.0, 0.0, 0.0, 0.0, 0.0
+        row_load, row_count, row_gaps, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
             row_load += p[j, i]
             row_count += 1.0 if mask[j, i] != 0.0 else 0.0
             row_gaps += u[j, i] - h[j, i]
-            across += 1.0 if (mask[j, i] != 0.0) != (before[i] != 0.0) else 0.0
+            along_y += 1.0 if (mask[j, i] != 0.0) != (before[i] != 0.0) else 0.0
             largest[i] = max(largest[i], p[j, i])
         for i in range(1, p.shape[1]):
-            along += 1.0 if (mask[j, i] != 0.0) != (mask[j, i - 1] != 0.0) else 0.0
+            along_x += 1.0 if (mask[j, i] != 0.0) != (mask[j, i - 1] != 0.0) else 0.0
         if cyclic:
-            along += 1.0 if (mask[j, 0] != 0.0) != (mask[j, -1] != 0.0) else 0.0
+            along_x += 1.0 if (mask[j, 0] != 0.0) != (mask[j, -1] != 0.0) else 0.0
         load += row_load
         count += row_count
         gaps += row_gaps
-        sides += across + along
+        sides_x += along_x
+        sides_y += along_y
     for i in range(largest.size):
         most = max(most, largest[i])
-    return load, count, gaps, sides, most
+    return load, count, gaps, sides_x, sides_y, most
 
 
 @loop

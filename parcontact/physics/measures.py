@@ -25,9 +25,10 @@ class Measures:
     `contact_area` counts the points with pressure. `contact_area_corrected` subtracts the excess along edges of
     contact. The correction holds on average for edges in all directions that are smooth on the scale of a cell:
     spheres, and rough surfaces whose shortest wave has at least 4 cells. The edge of the box is not an edge of contact.
-    `spared` is the share that is not subtracted because points on the edge have yielded. `at_edge`: an isolated contact
-    reaches the edge of the box. Forces and `friction` include the interface, whose part is `force_interface` and
-    `friction_interface`. Friction is 0 without a compressive load.
+    `spared` is the share that is not subtracted because points on the edge have yielded. `straight` is 1 if all edges
+    of contact are parallel to one axis of the grid, and 0 if equal lengths are parallel to x and y, as of round spots.
+    `at_edge`: an isolated contact reaches the edge of the box. Forces and `friction` include the interface, whose part
+    is `force_interface` and `friction_interface`. Friction is 0 without a compressive load.
     """
 
     pressure: float = 0.0
@@ -44,6 +45,7 @@ class Measures:
     friction_interface: float = 0.0
     force_interface: float = 0.0
     spared: float = 0.0
+    straight: float = 0.0
 
     @property
     def finite(self) -> bool:

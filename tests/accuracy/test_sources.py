@@ -107,6 +107,14 @@ def test_an_interface_has_the_error_of_the_area() -> None:
     assert mixed.friction.total == pytest.approx(0.25 * body.total + 0.75 * area.total)
 
 
+def test_steady_friction_of_rounded_pressures_is_not_known() -> None:
+    """Waves of rounded pressures lose up to the square of the least single number: friction along ridges is 0."""
+    least = float(np.finfo(np.float32).eps) ** 2
+    for friction, error in ((least, 1.0), (100.0 * least, 0.01)):
+        found = friction_of(RUN, replace(SEEN, complementarity=1e-9, friction=friction), steady=True)
+        assert found.solver == pytest.approx(error)
+
+
 # -- mesh -----------------------------------------------------------------------------------------------------------
 
 
@@ -116,10 +124,13 @@ def test_an_interface_has_the_error_of_the_area() -> None:
 )
 def test_the_mesh_makes_the_area_wrong(judge: Any, way: tuple[float, float], share: float) -> None:
     """By 0.5 of the correction over the fourth root of the number of spots in a slide, 0.72 at rest and in steady
-    sliding, a cell at least; four times that of one spot where they are identical."""
+    sliding, a cell at least; four times that of one spot where they are identical. Where edges follow an axis of the
+    grid it is four times as large, as they have one position on it; where three of four do, two and a half times."""
     seen = replace(SEEN, way=way)
     found = judge(RUN, seen).area.mesh
     assert found == pytest.approx(share / 19.0 / count_spots(RUN, seen) ** 0.25)
+    straight = (judge(RUN, replace(seen, straight=share)).area.mesh for share in (0.5, 1.0))
+    assert list(straight) == pytest.approx([2.5 * found, 4.0 * found])
     run = replace(RUN, identical_contacts=True)
     assert judge(run, seen).area.mesh == pytest.approx(4.0 * share / 19.0)
     assert judge(RUN, replace(seen, area=0.5, corrected=0.5)).area.mesh == pytest.approx(2e-4)

@@ -80,8 +80,8 @@ def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
 def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int) -> None:
     """Cells counted less `excess_of` for each side on the edge of contact: whole numbers, so the same on every rank.
 
-    In a periodic box of two cells each side is there twice, and counts twice; of one cell, not at all. Sides on the
-    edge of a free box do not count.
+    `straight` compares the lengths of these sides along x and along y. In a periodic box of two cells each side is
+        there twice, and counts twice; of one cell, not at all. Sides on the edge of a free box do not count.
     """
     slab = Slab(MPI.COMM_WORLD, nx, ny)
     surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=(periodic, periodic))
@@ -90,13 +90,15 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     p[...] = pressed[slab.rows]
     found = Probe(slab, surface, UNITS).measure(p, ALPHA, none, none, 0.0, p, (0.0, 0.0))
     if periodic:
-        sides = sum(np.count_nonzero(pressed != np.roll(pressed, 1, axis)) for axis in (0, 1))
+        each = [np.count_nonzero(pressed != np.roll(pressed, 1, axis)) for axis in (0, 1)]
     else:
-        sides = sum(np.count_nonzero(np.diff(pressed, axis=axis)) for axis in (0, 1))
+        each = [np.count_nonzero(np.diff(pressed, axis=axis)) for axis in (0, 1)]
+    sides, (along_x, along_y) = sum(each), (each[0] * LX / nx, each[1] * LY / ny)
     assert found.contact_area == np.count_nonzero(pressed) / (nx * ny)
     long = min(LX / nx, LY / ny) / max(LX / nx, LY / ny)
     excess = SIDE if 1 in (nx, ny) else SIDE * long**0.1
     assert found.contact_area_corrected == (np.count_nonzero(pressed) - excess * sides) / (nx * ny)
+    assert_allclose(found.straight * (along_x + along_y), abs(along_x - along_y), rtol=1e-14)
 
 
 @settings(max_examples=40)
