@@ -78,7 +78,7 @@ from .time_error import (
 STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
 NODES = 16  # accuracy: nodes of the integral; its error is 2 % for one branch
 AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-STRAIGHT_POWER = 0.5  # accuracy: power of m along edges that follow the grid
+STRAIGHT_POWER = 0.5  # fitted: power of m along edges that follow the grid (`scripts/error_coverage.py`)
 GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
 FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
 SINGLE = float(np.finfo(np.float32).eps)  # rounding: relative, of pressures, whose squares are friction by energy
@@ -144,8 +144,9 @@ def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors that the mesh causes in a state of steady sliding."""
-    correction = observed.correction * mean_over_spots(run, observed)
-    friction = _grow_if_coherent(run, observed) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
+    correction = _grow_if_coherent(run, observed) * observed.correction * mean_over_spots(run, observed)
+    lost = (IDENTICAL.value if run.identical_contacts else 1.0) * lost_at_edges(run, observed)
+    friction = lost + STEADY_AREA.value * correction
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
 
 

@@ -58,8 +58,8 @@ def test_friction_by_energy_on_coarse_meshes(
 @pytest.mark.parametrize("radius", [2.0, 4.0])
 def test_estimates_of_fast_small_spots(radius: float) -> None:
     """A sphere with a spot of a given number of cells, in four places between the points, on a body that loses most of
-    the work. The estimate is 0.4 of each error at least: 0.46 to 2.1 here, and from 0.36 without what edges lose. Its
-    mean is at most twice the root of the mean square error (0.8 and 1.4 times)."""
+    the work. The estimate is at least each error: 1.1 to 10 times. Its mean is at most five times the root of the mean
+    square error (1.9 and 4.2 times), as the spots are strips along the grid."""
     body = {"model": "zener", "modulus_inf": 1e5, "branches": ONE["branches"]}
     cell, velocity = 1e-3 / 32, 3.0 * radius / 32
     stiffness = abs(complex(pc.material(body).complex_modulus(np.pi * velocity / (radius * cell))))
@@ -70,8 +70,8 @@ def test_estimates_of_fast_small_spots(radius: float) -> None:
         fine, found = (steady({**scene(cells, body), "surface": sphere}, velocity, pressure) for cells in (8, 2))
         errors.append(abs(found.friction[0] / fine.friction[0] - 1.0))
         estimates.append(found.error_friction[0])
-    assert all(estimate > 0.4 * error for estimate, error in zip(estimates, errors, strict=True))
-    assert np.mean(estimates) < 2.0 * np.sqrt(np.mean(np.square(errors)))
+    assert all(estimate > error for estimate, error in zip(estimates, errors, strict=True))
+    assert np.mean(estimates) < 5.0 * np.sqrt(np.mean(np.square(errors)))
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
