@@ -1,17 +1,17 @@
 """The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
 
 **Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may use a larger
-tolerance, as long as the error of the solver stays below its share (`shares`) of the accuracy, or of the other parts of
-the budget if these are larger. Errors are proportional to the certificate of a solve. The factor of the tolerance is a
-mean over the last steps, rounded to a power of the square root of two against rounding errors. It is a part of the
-state, so that a restarted run continues identically. The last solve before a change of velocity or load, and a steady
-start, have a small tolerance: the body remembers the error of the displacement, and a much larger modulus may multiply
-this error after the change. The last step of a stage has a worse start than the steps from which the factor was learnt,
-as it seldom moves the surface by whole cells.
+tolerance, as long as the estimated error of the solver stays below OF_SOLVER of the accuracy of friction and
+OF_SOLVER_IN_AREA of that of the area, or of the other parts of the budget if these are larger. Errors are proportional
+to the certificate of a solve. The factor of the tolerance is a mean over the last steps, rounded to a power of the
+square root of two against rounding errors. It is a part of the state, so that a restarted run continues identically.
+The last solve before a change of velocity or load, and a steady start, have a small tolerance: the body remembers the
+error of the displacement, and a much larger modulus may multiply this error after the change. The last step of a stage
+has a worse start than the steps from which the factor was learnt, as it seldom moves the surface by whole cells.
 
-**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is the share of
-time steps in the accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1
-for backward Euler), the next step is
+**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is OF_STEPS of the
+accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1 for backward Euler),
+the next step is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
 
@@ -30,13 +30,15 @@ from functools import cached_property, partial
 
 from ..job import Job
 from ..job.advice import one_cell
-from ..job.calculation import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN, Accuracy
+from ..job.calculation import Accuracy
 from ..job.history import Bounds, ChosenEnds, ChosenSteps, MadeStep, Span, Step, Timeline, reached
 from ..physics.body import Body, remembers
 from ..physics.entries import Entry, Saved, Units
 from .budget import ErrorBudget, ErrorParts
 from .time_error import order_of_time_error
 
+OF_STEPS = 0.8  # tuning: estimated error of friction by time steps over the accuracy; it is twice the error or more
+OF_SOLVER, OF_SOLVER_IN_AREA = 0.1, 0.4  # tuning: the same by the solver, of friction and area
 MOST = 8.0  # accuracy: largest tolerance of a solve over the tolerance of the job
 LOOSEST = 0.05  # accuracy: largest tolerance of a solve
 CLOSE = 2.5e-4  # accuracy: largest tolerance before a change of velocity or load
@@ -131,9 +133,9 @@ class Controller:
         """Return the memory after a step with this error budget, whose solve has reached `certificate`."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
-        room = _room(budget.area, AREA.solver, self.asked.area)
+        room = _room(budget.area, OF_SOLVER_IN_AREA, self.asked.area)
         if budget.friction is not None:
-            room = min(room, _room(budget.friction, FRICTION.solver, self.asked.friction))
+            room = min(room, _room(budget.friction, OF_SOLVER, self.asked.friction))
         ratio = certificate * room / self.job.numerics.tolerance
         now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
         return StepTolerance(memory.mean + NEWEST * (now - memory.mean))
@@ -164,7 +166,7 @@ class Controller:
         share of the shortest relaxation time, so that a jump meets the body before it relaxes.
         """
         order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
-        ratio = error / (FRICTION.time * TIME_MEDIAN * self.asked.of_steps)
+        ratio = error / (OF_STEPS * self.asked.of_steps)
         jump = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
         if step.dt > jump:
             allowed = math.sqrt(self.asked.of_steps) if self.relaxes and self.energies else 1.0
@@ -308,7 +310,7 @@ def cells_per_step(most: float) -> float:
 
 def _room(parts: ErrorParts, share: float, accuracy: float) -> float:
     """Return the factor by which the estimated error of the solver may grow; infinite if it is 0."""
-    allowed = share * SOLVER_MEDIAN * max(accuracy, parts.total - parts.solver)
+    allowed = share * max(accuracy, parts.total - parts.solver)
     return allowed / parts.solver if parts.solver > 0.0 else math.inf
 
 

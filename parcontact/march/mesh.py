@@ -32,7 +32,7 @@ from .. import job
 from ..errors import InputError
 from ..job import Job, advice, listing
 from ..job.advice import Guess
-from ..job.calculation import FRICTION, STEADY, Accuracy, Grid, Numerics
+from ..job.calculation import Accuracy, Grid, Numerics
 from ..job.listing import plain_data
 from ..job.materials import AnyMaterial, Material
 from ..job.model import prepared
@@ -42,11 +42,12 @@ from ..job.stages import Initial, Stage, Steady
 from ..job.surfaces import OnOneMesh, Rough, RoughSpectrum, Shape, Spectral, Topography, Wave
 from ..job.yaml_text import UNREADABLE, Source, is_array
 
+OF_MESH, OF_MESH_ALONE = 0.6, 0.9  # tuning: error by the mesh over the accuracy, with time steps and without
 UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: share in contact and phase if slopes or loads are unknown
 LEAST, MOST = 0.005, 0.99  # accuracy: limits on the share for which the laws of the mesh hold
-MORE = 1.42  # fitted: power of the open share in sliding (50 steady states, 17 %)
+MORE = 1.42  # fitted: power of the open share in sliding (`scripts/chosen_mesh.py`)
 FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: frequencies of spots, edges and finest waves over the shortest wave's
-SLOWNESS = 1.5  # accuracy: power of the slowness
+SLOWNESS = 1.5  # fitted: power of the slowness (`scripts/chosen_mesh.py`)
 NODES = 400  # accuracy: nodes of integrals over the spectrum; their error is 1e-4
 
 
@@ -226,7 +227,7 @@ def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Ori
             f"{MOST_POINTS} points; make grid.size smaller, or the shortest wave longer"
         )
     directions = advice.directions_of(scenery.history, scenery.initial, scenery.steady)
-    asked, share = scenery.numerics.asked, (FRICTION if scenery.history else STEADY).mesh
+    asked, share = scenery.numerics.asked, OF_MESH if scenery.history else OF_MESH_ALONE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
     touching = guesses(scenery, wave, box.lx * box.ly)
     points = advice.choose_points(wave, box.size, directions, own, touching)

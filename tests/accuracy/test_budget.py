@@ -1,23 +1,14 @@
-"""The arithmetic of the error budget: sums over steps, and shares of the accuracy."""
+"""The arithmetic of the error budget: sums over steps."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import pytest
 
-from parcontact.job.calculation import AREA, FRICTION, STEADY, Shares
 from parcontact.march.budget import ErrorSums, estimate
 from parcontact.march.time_error import RunProperties, StepObservation
 
 KNOWN = RunProperties(10_000, cells_per_wave=8.0, folded=1e-4)
 SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02, difference=4e-4)
-
-
-def test_shares_of_the_accuracy_add_up() -> None:
-    """To 1, in all of them; others are refused."""
-    for shares in (FRICTION, AREA, STEADY):
-        assert sum(astuple(shares)) == pytest.approx(1.0, rel=1e-12)
-    with pytest.raises(ValueError, match=r"add up to 1\.1, not to 1"):
-        Shares(solver=0.2, folded=0.0, time=0.0, mesh=0.9)
 
 
 def test_summary() -> None:

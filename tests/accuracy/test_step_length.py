@@ -8,18 +8,17 @@ import pytest
 from marched_jobs import SLS, begun
 
 from parcontact.job import Grid, Job
-from parcontact.job.calculation import FRICTION, TIME_MEDIAN
 from parcontact.job.history import MadeStep, Step, most_cells
 from parcontact.job.stages import Stage
 from parcontact.job.surfaces import Flat, HeightFile, Rough, Sphere, Wave
-from parcontact.march.controller import MOST_GROWTH, REJECTED, SAFETY
+from parcontact.march.controller import MOST_GROWTH, OF_STEPS, REJECTED, SAFETY
 from parcontact.march.loop import March
 
 Json = dict[str, Any]
 CELL = 1e-3 / 32
 PRESS: Json = {"pressure": 1e4, "duration": 5e-3}
 SLIDE: Json = {"pressure": 1e4, "velocity": 0.1, "distance": 6.3 * CELL}
-ALLOWED = FRICTION.time * TIME_MEDIAN * 1e-2  # of numerics.accuracy
+ALLOWED = OF_STEPS * 1e-2  # of numerics.accuracy
 Errors = Callable[[int, Step], float]
 
 
