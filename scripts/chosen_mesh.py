@@ -13,6 +13,11 @@ A chosen mesh is compared with the cheapest mesh that has LENGTHS along each sid
 and change signs from mesh to mesh, so a coarse mesh may keep an accuracy by chance. The cheapest mesh is therefore one
 that keeps the accuracy together with all meshes that are as fine or finer along each side.
 
+The last lines judge MORE of `march.mesh`, by the guessed over the true area; LONG_CELLS of `physics.measures`, by the
+true excess of the counted area over the assumed one, on meshes with square and with long cells; and SEED_FRICTION and
+SEED_AREA of `job.advice`, by the scatter over SEEDS surfaces times the number of longest waves along a side. SURE of
+`job.advice`, and SLOWNESS of `march.mesh`, are judged by the errors of chosen meshes.
+
 The exit code is 0 if at most a tenth of the accuracies is missed, and if chosen meshes have in the median at most MOST
 times the points of the cheapest ones.
 """
@@ -22,7 +27,7 @@ import math
 import statistics
 import sys
 import warnings
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from itertools import product
@@ -31,9 +36,10 @@ from random import Random
 from typing import Any
 
 import campaign
+import numpy as np
 
 import parcontact as pc
-from parcontact.march.mesh import load
+from parcontact.march.mesh import guesses, load
 
 ACCURACIES = (0.05, 0.01, 0.003)
 SIZE, DOZEN = 1e-3, 12
@@ -42,7 +48,11 @@ LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)  # points alon
 AREA_ORDER = 1.0  # order of the error, as edges of contact are wrong by a share of a cell
 AREA, DOZENS = "accuracy of the area over accuracy of friction", "dozens of shortest waves along a side of the box"
 
+LONGEST_WAVES, SEEDS = 3, 6  # longest waves along a side, and surfaces for their scatter
+LEAST_CELLS, LONG = 5, 4  # cells per shortest wave, and ratio of their sides, where excesses are compared
+
 Mesh = tuple[int, int]
+Ratios = dict[str, list[float]]
 Keeps = Callable[[Mesh], bool]
 
 
@@ -61,21 +71,21 @@ def scene(seed: int, number: int, dozens: int) -> dict[str, Any]:
     pressure = stiffness * slope * (2.0 * area + 8.0 * max(area - 0.5, 0.0))
     return {
         "grid": {"size": SIZE},
-        "surface": {**rough, "long_wavelength": SIZE / 3, "short_wavelength": wave},
+        "surface": {**rough, "long_wavelength": SIZE / LONGEST_WAVES, "short_wavelength": wave},
         "material": body,
         "steady": {"velocities": [speed], "pressures": [pressure]},
     }
 
 
-def steady(job: dict[str, Any], mesh: Mesh) -> tuple[float, float]:
-    """Return friction and corrected area, with a tolerance of a hundredth of the smallest accuracy."""
+def steady(job: dict[str, Any], mesh: Mesh) -> tuple[float, float, float]:
+    """Return friction, corrected and counted area, with a tolerance of a hundredth of the smallest accuracy."""
     numerics = {"tolerance": 3e-5, "branch_error": 0.0}
     found = pc.steady({**job, "grid": {"points": list(mesh), "size": SIZE}, "numerics": numerics})
-    return float(found.friction[0]), float(found.contact_area_corrected[0])
+    return float(found.friction[0]), float(found.contact_area_corrected[0]), float(found.contact_area[0])
 
 
-def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], number: int) -> Iterator[str]:
-    """Yield the missed accuracies; append the ratios of the points to the points of the cheapest mesh."""
+def trial(asked: argparse.Namespace, counts: Counter[str], ratios: Ratios, number: int) -> Iterator[str]:
+    """Yield the missed accuracies; append ratios of points, areas and their excesses."""
     job, meshes = scene(asked.seed, number, asked.dozens), meshes_of(asked.dozens, asked.finest)
     solved = cache(partial(steady, job))
     finest, half = solved((asked.finest, asked.finest)), solved((asked.finest // 2, asked.finest // 2))
@@ -83,7 +93,7 @@ def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], 
     print(f"{number}: friction {true[0]:.5f}, area {true[1]:.4f}", flush=True)
 
     def errors(mesh: Mesh) -> tuple[float, float]:
-        friction, area = solved(mesh)
+        friction, area, _ = solved(mesh)
         return abs(friction / true[0] - 1.0), abs(area / true[1] - 1.0)
 
     for accuracy in ACCURACIES:
@@ -94,11 +104,22 @@ def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], 
         found = " and ".join(f"{100 * error:.2f} %" for error in errors(chosen))
         counts["accuracies"] += 1
         text, best = f"{100 * accuracy:g} %: {chosen[0]} x {chosen[1]}", cheapest(keeps, meshes, math.prod(chosen))
-        ratios.append(math.prod(chosen) / math.prod(best or chosen))
+        ratios["points"].append(math.prod(chosen) / math.prod(best or chosen))
         print(f"  {text}, errors {found}; cheapest: {f'{best[0]} x {best[1]}' if best else 'this one'}", flush=True)
         if not keeps(chosen):
             counts["missed"] += 1
             yield f"{text} points have errors of {found}"
+    read = load({**job, "grid": {"points": 64, "size": SIZE}})
+    ratios["guess"].append(guesses(read, read.surface[0].short_wavelength, SIZE**2)[0].share / true[1])  # type: ignore[union-attr]
+    dense = DOZEN * asked.dozens * LEAST_CELLS
+    for name, mesh in (("square", (dense, dense)), ("long", (LONG * dense, dense)), ("long", (dense, LONG * dense))):
+        _, corrected, counted = solved(mesh)
+        ratios[name].append((counted - true[1]) / (counted - corrected))
+    others = [{**job, "surface": {**job["surface"], "seed": 1000 + seed}} for seed in range(SEEDS)]
+    values = np.array([steady(other, (dense, dense))[:2] for other in others])
+    scatter = LONGEST_WAVES * values.std(axis=0, ddof=1) / values.mean(axis=0)
+    for name, value in zip(("friction", "area"), scatter.tolist(), strict=True):
+        ratios[name].append(value)
 
 
 def meshes_of(dozens: int, finest: int) -> list[Mesh]:
@@ -120,11 +141,16 @@ def cheapest(keeps: Keeps, meshes: list[Mesh], most: int) -> Mesh | None:
 def main() -> int:
     finest = 1920, "points of the reference along a side"
     options = campaign.parser(__doc__, 10, "scenes", area=(1.0, AREA), dozens=(1, DOZENS), finest=finest)
-    asked, counts, ratios = options.parse_args(), Counter[str](), list[float]()
+    asked, counts, ratios = options.parse_args(), Counter[str](), defaultdict[str, list[float]](list)
     warnings.simplefilter("ignore")
     campaign.go(asked, partial(trial, asked, counts, ratios), counts)
-    median, more = statistics.median(ratios), sum(ratio > MOST for ratio in ratios)
+    median, more = statistics.median(ratios["points"]), sum(ratio > MOST for ratio in ratios["points"])
     print(f"points over points of the cheapest mesh: {median:.2f} in the median, above {MOST} {more} times")
+    print(f"guessed area over the true one: {statistics.median(ratios['guess']):.2f} in the median")
+    excess = ", ".join(f"{name} cells {statistics.median(ratios[name]):.2f}" for name in ("square", "long"))
+    seeds = ", ".join(f"{name} {statistics.median(ratios[name]):.2f}" for name in ("friction", "area"))
+    print(f"scatter of surfaces times longest waves along a side, median: {seeds}")
+    print(f"excess of the counted area over the assumed one, median: {excess}")
     return 0 if counts["missed"] <= 0.1 * counts["accuracies"] and median <= MOST else 1
 
 

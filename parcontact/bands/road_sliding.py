@@ -28,7 +28,9 @@ from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands
 
 MOST_ROUNDS = 20  # tuning: limit on rounds of the loops of effects
-HARD_SHARE = 0.25  # fitted: error of the method over the difference to hard walls; 1 for profiles
+HARD_SHARE = (
+    0.25  # fitted: error of the method over the difference to hard walls, 1 for profiles (`scripts/band_errors.py`)
+)
 LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
 LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it

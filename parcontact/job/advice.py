@@ -63,12 +63,12 @@ class Sections(Protocol):
 
 Vector = tuple[float, float]
 
-SURE = 1.2  # accuracy: standard deviations within which nine of ten surfaces lie
+SURE = 1.2  # fitted: standard deviations within which nine of ten surfaces lie (`scripts/chosen_mesh.py`)
 FEW = 12.0  # accuracy: smallest number of shortest waves along a side in the fits
-CELLS_PER_WAVE = 8  # accuracy: square cells per shortest wave for an error of 1 %
-FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: order of convergence of the error in the number of cells
-FRICTION_ASIDE, FRICTION_ASIDE_ORDER = 3e-3, 2.5  # accuracy: error with four cells across the sliding, and its order
-AREA_ASIDE, AREA_ASIDE_ORDER = 0.0148, 1.1  # accuracy: the same for the area
+CELLS_PER_WAVE = 8  # tuning: square cells per shortest wave for an error of 1 %, below which a warning is given
+FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # tuning: order of this error in the number of cells
+FRICTION_ASIDE, FRICTION_ASIDE_ORDER = 3e-3, 2.5  # tuning: error with four cells across, and its order, for the same
+AREA_ASIDE, AREA_ASIDE_ORDER = 0.0148, 1.1  # tuning: the same for the area
 ASIDE = 0.25  # accuracy: component of a unit vector along an axis, up to which the axis is across the sliding
 LEAST_CELLS = 2.1  # accuracy: least cells per shortest wave; a grid has no waves shorter than two cells
 LONG = 1.2  # accuracy: ratio of the sides of a cell up to which it counts as square
@@ -236,10 +236,9 @@ STEPS_PER_WAVE = 4  # accuracy: least time steps per shortest wave while sliding
 SAME_LENGTH = 1e-9  # rounding: relative difference below which lengths are the same
 LITTLE = 0.05  # tuning: relative lack of points that gets no warning
 
-# Relative standard deviation over 8 to 12 seeds, times the number of longest waves along a side; found with six steady
-# states of 2 to 50 % contact of bodies with one and twelve branches, in boxes of 2, 4 and 8 longest waves: 0.11 to 0.44
-# for friction, 0.05 to 0.33 for the area.
-SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
+# fitted: relative standard deviation over seeds, times longest waves along a side (`scripts/chosen_mesh.py`); 0.1 to
+# 0.4 for friction, 0.01 to 0.5 for the area
+SEED_FRICTION, SEED_AREA = 0.24, 0.17
 
 
 def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:

@@ -17,15 +17,15 @@ is delayed by L/2 of a step,
 
 In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w is a mean over the
 branches with w = G omega tau/(1 + (omega tau)^2), their shares of friction. theta is the angle of a wave with the
-height and the change of the surface; as shorter waves contribute more to friction, the error of many waves is 1.5 times
-as large (LINEAR_TURNING). Where contact spots of radius a pass by x = (distance of the step)/a, delayed forces move
+height and the change of the surface; as shorter waves contribute more to friction, the error of many waves is
+MANY_WAVES times as large. Where contact spots of radius a pass by x = (distance of the step)/a, delayed forces move
 their edges:
 
     E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
 A quadratic step also follows the bend of the motion. In full contact the error of its loss is 0.25 to 0.33 of theta^2
-<L> plus theta^4/75 (`prony.discrete_modulus`); TURNING and TURNING_4 are 1.5 times as large. Edges leave an error of
-third order, PASSING x^3.
+<L> plus theta^4/75 (`prony.discrete_modulus`), and again MANY_WAVES times as large. Edges leave an error of third
+order, PASSING x^3.
 
 The second estimate is the embedded pair (`embedded`), which shows jumps, changes of load, and creep. For a quadratic
 step it is the difference to a linear step. The pair of a linear step differs in second order if all branches are slow,
@@ -56,20 +56,17 @@ from .constants import (
     EULER_AREA,
     LINEAR_PAIR,
     LINEAR_PASSING,
-    LINEAR_TURNING,
-    PAIR,
+    MANY_WAVES,
     PAIR_SHARE,
     PASSING,
     TIME_AREA,
-    TURNING,
-    TURNING_4,
 )
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
 ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
 MANY_RADIUS = 0.7  # accuracy: least resolved radius or half width [cells] of many spots: more than single cells
 ONE_RADIUS = 1.3  # accuracy: the same of one spot, and of identical ones: more than five cells, or strips two wide
-SPOTS_POWER = 0.25  # accuracy: power of the number of spots by which the error of their mean falls
+SPOTS_POWER = 0.25  # fitted: power by which more spots reduce the error of the mean (`scripts/error_coverage.py`)
 Vector = tuple[float, float]
 
 
@@ -233,10 +230,10 @@ def cell_along(run: RunProperties, way: Vector) -> float:
     return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)
 
 
-PASSING_LOSS = 0.19  # accuracy: relative error of the loss in a linear step over x
+PASSING_LOSS = 0.19  # fitted: relative error of the loss in a linear step over x (`scripts/march_errors.py`)
 SLOW = 1e-3  # rounding: z below which L is computed by its series
 LEAST_POWER = 0.25  # accuracy: least difference of the orders of error and of a linear pair
-FULL_POWER = 4  # accuracy: power of the contact area that weights the error in full contact
+FULL_POWER = 4  # fitted: power of the area that weights the error in full contact (`scripts/march_errors.py`)
 FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges cause
 
 
@@ -252,20 +249,20 @@ def time_error(run: RunProperties, observed: StepObservation) -> float:
     full, late = observed.area**FULL_POWER, _late(run.prony, observed.angle, observed.seconds)
     x, angle = _share_passed(run, observed), observed.angle
     if observed.curved:
-        passing, turning = PASSING.value * x**3, TURNING.value * late * angle**2 + TURNING_4.value * angle**4
+        passing, turning = PASSING.value * x**3, 0.3 * late * angle**2 + angle**4 / 75.0
         least = PAIR_SHARE.value
     else:
         passing = LINEAR_PASSING.value * x * (_late(run.prony, x, observed.seconds) + PASSING_LOSS * x)
-        turning = LINEAR_TURNING.value * angle**2 * (1.0 + late)
+        turning = angle**2 * (1.0 + late) / 12.0
         least = full + (1.0 - full) * PAIR_SHARE.value
-    return min(1.0, max((1.0 - full) * passing + full * turning, least * pair))
+    return min(1.0, max((1.0 - full) * passing + full * MANY_WAVES.value * turning, least * pair))
 
 
 def _error_by_pair(observed: StepObservation) -> float:
     """Return the error by the embedded pair. For linear steps it has the order LINEAR_PAIR.order, the difference
     `order`."""
     if observed.curved:
-        return PAIR.value * observed.difference
+        return observed.difference
     power = max(LEAST_POWER, LINEAR_PAIR.order / max(observed.order, 1.0) - 1.0)
     fixed = 1.0 - FIXED_EDGES * observed.area**2
     more = (observed.difference / EQUAL_DIFFERENCE.value) ** power

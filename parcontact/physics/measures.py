@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-LONG_CELLS = 0.1  # fitted: power of the ratio of sides in `excess_of`
+LONG_CELLS = 0.1  # fitted: power of the ratio of sides in `excess_of` (`scripts/chosen_mesh.py`)
 SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per side of a cell on the edge of contact
 
 

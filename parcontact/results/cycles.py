@@ -41,9 +41,9 @@ PAIRS = (
     2.0**3 - 1.0
 )  # accuracy: difference between the errors of steps twice as long and of steps, over the error of steps
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(4), (1, 0), strict=True))
-# fitted to spheres in tests/summary/test_cycles.py: errors of steps over those of one harmonic; of solves, which are
-# independent of each other; and of the loss over that of the area (0.25 at most)
-HARMONICS, NOISE, MESH = 2.0, 2.0, 0.3
+HARMONICS = 2.0  # fitted: errors of steps over those of one harmonic (tests/summary/test_cycles.py)
+NOISE = 2.0  # fitted: error of independent solves over that of one (tests/summary/test_cycles.py)
+MESH = 0.3  # fitted: error of the loss over that of the area, 0.25 at most (tests/summary/test_cycles.py)
 NO_PHASE = 1e-100  # rounding: sine of the phase of a body that loses nothing
 Columns = Mapping[str, Sequence[float]]
 

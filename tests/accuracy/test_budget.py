@@ -1,14 +1,37 @@
-"""The arithmetic of the error budget: sums over steps."""
+"""The arithmetic of the error budget: sums over steps, and what judges its constants."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from parcontact.march import constants
 from parcontact.march.budget import ErrorSums, estimate
 from parcontact.march.time_error import RunProperties, StepObservation
 
+ROOT = Path(__file__).resolve().parents[2]
 KNOWN = RunProperties(10_000, cells_per_wave=8.0, folded=1e-4)
 SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02, difference=4e-4)
+
+
+def test_fitted_constants_of_the_budget_name_what_judges_them() -> None:
+    """A script or a test that exists; a script also names the constant."""
+    fits = {name: fit.found_by for name, fit in vars(constants).items() if isinstance(fit, constants.Fit)}
+    for name, found_by in fits.items():
+        text = (ROOT / found_by / "test_spectrum.py" if found_by == "tests/road" else ROOT / found_by).read_text()
+        assert found_by.startswith("tests") or re.search(rf"\b{name}\b", text), name
+
+
+def test_all_other_fitted_constants_name_what_judges_them() -> None:
+    """In the comment, or in the comment above, by a path that exists."""
+    paths = (ROOT / "parcontact").rglob("*.py")
+    fitted = [line for path in paths for line in path.read_text().splitlines() if re.search(r"# fitted\b", line)]
+    assert fitted
+    for line in fitted:
+        named = re.search(r"(?:scripts|tests)/[\w/]+\.py", line)
+        assert named, line
+        assert (ROOT / named[0]).exists(), line
 
 
 def test_summary() -> None:

@@ -91,11 +91,11 @@ def test_little_friction_counts_more() -> None:
 
 @pytest.mark.parametrize("friction", [1e-18, 1e-7, 1e-6])
 def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
-    """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 0.4 of 2e-5 of the load where there is
+    """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 0.8 of 2e-5 of the load where there is
     one spot, by the root of their number less where there are more."""
     seen = replace(SEEN, friction=friction)
     budget = friction_of(RUN, seen)
-    assert budget.solver * friction == pytest.approx(0.4 * 2e-5 / count_spots(RUN, seen) ** 0.5)
+    assert budget.solver * friction == pytest.approx(0.8 * 2e-5 / count_spots(RUN, seen) ** 0.5)
     assert budget.of_friction >= 1.0
 
 
