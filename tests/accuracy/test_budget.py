@@ -19,7 +19,7 @@ def test_fitted_constants_of_the_budget_name_what_judges_them() -> None:
     """A script or a test that exists; a script also names the constant."""
     fits = {name: fit.found_by for name, fit in vars(constants).items() if isinstance(fit, constants.Fit)}
     for name, found_by in fits.items():
-        text = (ROOT / found_by / "test_spectrum.py" if found_by == "tests/road" else ROOT / found_by).read_text()
+        text = (ROOT / found_by).read_text()
         assert found_by.startswith("tests") or re.search(rf"\b{name}\b", text), name
 
 
