@@ -273,7 +273,7 @@ def _others(own: Json, reference: Json) -> Iterator[Json]:
             yield {"quantity": quantity, "value": last[name], "error": error, "estimate": estimated}
     if "tensile_area" in last:
         found = [_pull_off(each) for each in (own, reference)]
-        if all(found) and found[0] and found[1]:
+        if all(found) and found[0] and found[1] and math.isfinite(found[0][1]):
             (load, within), (exact, _) = found
             yield {"quantity": "pull-off", "value": load, "error": abs(exact / load - 1.0), "estimate": within / load}
 
