@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Errors of friction and area by the time steps of random marches, against steps of an eighth of a cell on one mesh.
 
-    .venv/bin/python scripts/march_errors.py [--marches 40] [--seed 0] [--from 0] [--only NUMBER]
+    .venv/bin/python scripts/march_errors.py [--marches 66] [--seed 0] [--from 0] [--only NUMBER]
 
 Marches are slides from rest, oblique slides, steps of velocity and reversals, on rough surfaces of 6 to 16 cells per
 shortest wave; every fifth one slides in full contact, and every fifth one rests under a load. The first table has the
@@ -188,7 +188,7 @@ def _errors(errors: NDArray[np.float64]) -> str:
 
 
 def main() -> int:
-    asked = campaign.parser(__doc__, trials=40, what="marches").parse_args()
+    asked = campaign.parser(__doc__, trials=66, what="marches").parse_args()
     warnings.simplefilter("ignore")
     found: dict[Any, list[tuple[float, ...]]] = defaultdict(list)
     faulty = campaign.go(asked, lambda number: trial(asked.seed, found, number), Counter())
