@@ -110,7 +110,7 @@ def trial(asked: argparse.Namespace, counts: Counter[str], ratios: Ratios, numbe
             counts["missed"] += 1
             yield f"{text} points have errors of {found}"
     read = load({**job, "grid": {"points": 64, "size": SIZE}})
-    ratios["guess"].append(guesses(read, read.surface[0].short_wavelength, SIZE**2)[0].share / true[1])  # type: ignore[union-attr]
+    ratios["guess"].append(guesses(read, SIZE / (DOZEN * asked.dozens), SIZE**2)[0].share / true[1])
     dense = DOZEN * asked.dozens * LEAST_CELLS
     for name, mesh in (("square", (dense, dense)), ("long", (LONG * dense, dense)), ("long", (dense, LONG * dense))):
         _, corrected, counted = solved(mesh)

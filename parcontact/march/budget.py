@@ -78,7 +78,6 @@ from .time_error import (
 STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
 NODES = 16  # accuracy: nodes of the integral; its error is 2 % for one branch
 AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-STRAIGHT_POWER = 0.5  # fitted: power of m along edges that follow the grid (`scripts/error_coverage.py`)
 GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
 FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
 SINGLE = float(np.finfo(np.float32).eps)  # rounding: relative, of pressures, whose squares are friction by energy
@@ -179,7 +178,7 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
     share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.edges_follow_grid)
     few = min(1.0, GAPS * (1.0 - observed.area))
     most = FREE_LOST.value if run.free else LOST.value
-    return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.edges_follow_grid else 1.0))
+    return min(1.0, most * few * share * slow)
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:

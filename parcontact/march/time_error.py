@@ -232,9 +232,9 @@ def cell_along(run: RunProperties, way: Vector) -> float:
 
 PASSING_LOSS = 0.19  # fitted: relative error of the loss in a linear step over x (`scripts/march_errors.py`)
 SLOW = 1e-3  # rounding: z below which L is computed by its series
-LEAST_POWER = 0.25  # accuracy: least difference of the orders of error and of a linear pair
+LEAST_POWER = 0.25  # fitted: least difference of the orders of error and of a linear pair (`scripts/march_errors.py`)
 FULL_POWER = 4  # fitted: power of the area that weights the error in full contact (`scripts/march_errors.py`)
-FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges cause
+FIXED_EDGES = 0.9  # fitted: share of the error of a linear pair that edges cause (`scripts/march_errors.py`)
 
 
 def time_error(run: RunProperties, observed: StepObservation) -> float:
