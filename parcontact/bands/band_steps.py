@@ -1,11 +1,13 @@
 """Time steps of one band: each stage of a job becomes stages whose steps follow the cell and the waves of the band.
 
-After a change of velocity the steps of a slide grow from a small part of a cell to half a cell. After a slip of SETTLED
-longest waves a band slides steadily, and makes no steps until the next stage: fine bands settle within micrometres. So
-a band's own history is shorter than the job's, and a step is placed by the number of the job's stage and by the time
-since this stage began.
+After a change of velocity the steps of a slide grow from a small part of a cell to half a cell. Then each has exactly
+half a cell, so that solves start from the pressures of the step before the last, moved by a cell (`march.laws`).
+After a slip of SETTLED longest waves a band slides steadily, and makes no steps until the next stage: fine bands
+settle within micrometres. So a band's own history is shorter than the job's, and a step is placed by the number of
+the job's stage and by the time since this stage began.
 """
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -19,6 +21,7 @@ from ..job.stages import GeometricStep, Stage
 FIRST, GROWTH, LONGEST = 0.02, 1.35, 0.5  # accuracy: cells of the first step of a slide, growth, cells of the longest
 SETTLED = 1.5  # accuracy: slip of a stage over the longest wave of a band, after which the band is steady
 OF_REST, GROWTH_OF_REST = 1e-6, 2.0  # accuracy: first step of a rest over its duration, and growth
+ROUNDING = 1e-9  # rounding: of a number of steps
 BEFORE = -1.0  # time since the start of a steady state before all steps
 OF_FASTEST = 0.1  # accuracy: the same over the shortest relaxation time, if that is longer
 
@@ -48,9 +51,10 @@ def _parts(job: Job, stage: Stage, cell: float, longest: float) -> Iterator[Stag
         most, first = LONGEST * cell, FIRST * cell
         way = min(stage.seconds * stage.speed, SETTLED * longest)
         growing = min(way, (most - first) / (1.0 - 1.0 / GROWTH))  # steps from `first` to `most`
-        yield _timed(stage, growing / stage.speed, first / stage.speed, GROWTH)
-        if way > growing:
-            yield _timed(stage, (way - growing) / stage.speed, most / stage.speed, 1.0)
+        steady = math.ceil((way - growing) / most - ROUNDING) * most
+        yield _timed(stage, (way - steady) / stage.speed, first / stage.speed, GROWTH)
+        if steady:
+            yield _timed(stage, steady / stage.speed, most / stage.speed, 1.0)
 
 
 def rest_step(job: Job, stage: Stage) -> float:

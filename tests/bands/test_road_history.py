@@ -18,6 +18,7 @@ from parcontact.bands.road_sliding import RoadSliding
 from parcontact.files import stopping, tables
 from parcontact.files.recorder import StepRow
 from parcontact.files.road_run import ended, sum_up_errors
+from parcontact.job.history import Timeline
 from parcontact.job.yaml_text import dump
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import info, prediction
@@ -137,6 +138,19 @@ def test_rungs_that_remember_another_pressure_state_an_error(monkeypatch: pytest
     assert memory(initial=start, history=[slide])[1].max() < 0.1 * from_rest.max()
     short_slips, short = memory(history=[rest, {**slide, "distance": LONG / 8}])
     assert (short - np.interp(short_slips, slips, from_rest)).min() > -1e-3
+
+
+@pytest.mark.parametrize("slip", [0.7 * LONG, 1.5 * LONG])
+def test_slides_settle_with_steps_of_half_a_cell(slip: float) -> None:
+    """Then the surface has moved by a whole cell since the step before the last, and its pressures are the start: of
+    bands from 1 cm to 10 um, steps of 0.495 cells take 3 times as many calls on the lowest rungs."""
+    for number in (0, 1):
+        job = Band((road := history(history=[{**SLIDE, "distance": slip}])).job, road.cut, number, 0).setup.job
+        cells = [step.position[0] / job.grid.dx for step in Timeline(job.history, job.grid)]
+        moved = np.diff(cells)
+        settling = moved > 0.5 - 1e-9
+        assert moved.max() < 0.5 + 1e-9
+        assert np.count_nonzero(settling) == np.argmin(settling[::-1]) > 1
 
 
 STEADY = {"velocities": [1.0], "pressures": [1e5]}
