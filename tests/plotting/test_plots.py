@@ -54,11 +54,11 @@ def test_wide_names_of_stages_do_not_touch(tmp_path: Path, drawn: list[Figure]) 
 
 
 @pytest.mark.rendered
-@pytest.mark.parametrize("text", [r"\e[31m", r"\t", r"\0", r"\ud800", r"\uffff", r"\x85", "轮胎"])
-def test_pictures_are_xml(tmp_path: Path, text: str) -> None:
+def test_pictures_are_xml(tmp_path: Path) -> None:
     """Whatever characters title and names of stages have; and no letter that the font lacks makes a warning."""
-    stages = ", ".join(f'{{name: "{text} {k}", pressure: {k}.0e3, duration: 1.0, time_step: 1.0}}' for k in (1, 2))
-    out = ran(tmp_path, f'title: "{text}"\n{WAVE}{ELASTIC}history: [{stages}]\n')
+    texts = [r"\e[31m", r"\t", r"\0", r"\ud800", r"\uffff", r"\x85", "轮胎"]
+    stages = ", ".join(f'{{name: "{text} a", pressure: 1.0e3, duration: 1.0, time_step: 1.0}}' for text in texts)
+    out = ran(tmp_path, f'title: "{" ".join(texts)}"\n{WAVE}{ELASTIC}history: [{stages}]\n')
     assert asked(out, "--format", "svg") == 0
     assert len(list(ElementTree.parse(out / "picture.svg").iter())) > 100
     assert asked(out, out, "--compare", "--out", tmp_path / "both.png") == 0
