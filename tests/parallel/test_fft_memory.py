@@ -12,7 +12,7 @@ pytestmark = pytest.mark.mpi(3)
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize(
-    ("points", "lengths"), [((20, 14), (20, 14)), ((300, 200), (600, 400)), ((2000, 5), (2000, 5)), ((9, 30), (9, 30))]
+    ("points", "lengths"), [((20, 14), (20, 14)), ((60, 40), (120, 80)), ((400, 5), (400, 5)), ((9, 30), (9, 30))]
 )
 def test_planned_memory(
     communicators: list[MPI.Intracomm], points: tuple[int, int], lengths: tuple[int, int], dtype: type
