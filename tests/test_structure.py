@@ -3,6 +3,7 @@
 import ast
 import graphlib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -110,17 +111,20 @@ def _imports(module: str, tree: ast.Module) -> Iterator[str]:
             yield from [name] if name in MODULES else []
 
 
-OURS = {module: {name for name in imports(module) if room(name) in FLOOR} for module in MODULES}
+@cache
+def ours() -> dict[str, set[str]]:
+    """Return the modules of rooms that each module imports."""
+    return {module: {name for name in imports(module) if room(name) in FLOOR} for module in MODULES}
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_imports_point_down(module: str) -> None:
     floor = FLOOR[room(module)]  # a new room needs a place in FLOORS
-    assert not [name for name in OURS[module] if room(name) != room(module) and FLOOR[room(name)] >= floor]
+    assert not [name for name in ours()[module] if room(name) != room(module) and FLOOR[room(name)] >= floor]
 
 
 def test_no_module_needs_itself() -> None:
-    graphlib.TopologicalSorter(OURS).prepare()
+    graphlib.TopologicalSorter(ours()).prepare()
 
 
 @pytest.mark.parametrize("module", [module for module in MODULES if room(module) not in KNOW_MPI])
@@ -133,9 +137,9 @@ COMPARE = {"door", "results", "report", "verbs"}  # rooms that set theory next t
 
 def test_theory_stands_alone() -> None:
     """The oracle has nothing of ours but the moduli of a Prony series, and only what compares with it imports it."""
-    theirs = {name for module, names in OURS.items() if room(module) == "theory" for name in names}
+    theirs = {name for module, names in ours().items() if room(module) == "theory" for name in names}
     assert {name for name in theirs if room(name) != "theory"} <= {"physics.prony"}
-    users = {room(module) for module, names in OURS.items() if "theory" in map(room, names)}
+    users = {room(module) for module, names in ours().items() if "theory" in map(room, names)}
     assert users - {"theory"} <= COMPARE
 
 

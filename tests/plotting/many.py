@@ -19,10 +19,7 @@ from parcontact.rubber import compound
 BANDS, VELOCITIES, TEMPERATURES, PRESSURES = 12, np.logspace(-3, 1, 9), (0.0, 20.0, 40.0), (1e5, 4e5)
 BRANCHES, CASES, RUNS, INSTANTS = 40, 24, 3, 24  # branches of the fit: no picture of a curve shows them
 TITLE = "Ninety letters for a tread compound with silica on dry asphalt of a country road, wheel locked"
-LISTED = ", ".join(
-    f"{{modulus: {1e6 * 1.1**k:.6g}, relaxation_time: {10.0 ** (-0.3 * k):.6g}}}"
-    for k in range(4)
-)
+LISTED = ", ".join(f"{{modulus: {1e6 * 1.1**k:.6g}, relaxation_time: {10.0 ** (-0.3 * k):.6g}}}" for k in range(4))
 SHIFTED = "model: zener, modulus_inf: 1.0e6, shift: {law: wlf, C1: 8.86, C2: 101.6, reference: 20}"
 MATERIAL = f"material: {{{SHIFTED}, branches: [{LISTED}]}}\n"
 STEADY = "steady: {velocities: [1.0], pressures: [1.0e5]}\n"

@@ -9,7 +9,6 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
-import SurfaceTopography
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
@@ -34,6 +33,8 @@ def read(
 
 def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float] | None]]:
     """The same map in every format: path, and the unit and size that must be given."""
+    import SurfaceTopography  # takes half a second
+
     microns = HEIGHTS * 1e6
     map_of = SurfaceTopography.Topography(microns.T, (SIZE[0] * 1e6, SIZE[1] * 1e6), unit="um")
     for ending in ("nc", "x3p", "gwy"):
@@ -127,6 +128,8 @@ def test_line_scans(tmp_path: Path, case: str) -> None:
 def test_a_line_scan_of_an_instrument(tmp_path: Path) -> None:
     """As SurfaceTopography reads it; heights of a scan that is not uniform are interpolated."""
     x = 2.5e-6 * np.arange(24.0)
+    import SurfaceTopography
+
     SurfaceTopography.UniformLineScan(HEIGHTS[0], SIZE[0], unit="m").to_netcdf(str(tmp_path / "even.nc"))
     SurfaceTopography.NonuniformLineScan(x**2, 2.0 * x**2, unit="m").to_netcdf(str(tmp_path / "odd.nc"))
     even, odd = read(tmp_path / "even.nc"), read(tmp_path / "odd.nc")
