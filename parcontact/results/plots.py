@@ -161,17 +161,20 @@ def _suggest(path: Path) -> str:
 
 def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figure:
     """Draw the lines of all directories in one picture."""
-    for directory in directories:
-        if not _find_panels(directory, options):
-            raise InputError(f"{directory} has nothing to compare")
+    found = [_find_panels(directory, options) for directory in directories]
+    if [] in found:
+        raise InputError(f"{directories[found.index([])]} has nothing to compare")
     lost = zip(name_directories(directories), (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
-    return picture(title, group(compare_panels(directories, options)), log=options.log)
+    return picture(title, group(_compare(directories, found)), log=options.log)
 
 
 def compare_panels(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
     """Return the panels that at least `least` directories have, each with the lines of all directories."""
-    found = [_find_panels(directory, options) for directory in directories]
+    return _compare(directories, [_find_panels(directory, options) for directory in directories], least)
+
+
+def _compare(directories: Sequence[Path], found: Sequence[list[Panel]], least: int = 1) -> list[Panel]:
     return compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
 
 
