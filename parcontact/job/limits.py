@@ -191,7 +191,7 @@ def steady_bodies_do_not_flow(
 def refuse_flow(
     material: AnyMaterial, initial: Initial, steady: Steady | None, line: tuple[int, ...] = ()
 ) -> Iterator[Fault]:
-    """Refuse steady sliding of a body without long-term modulus, except along a `line` of points (nx, ny)."""
+    """Yield an error for steady sliding of a body without long-term modulus, except on a `line` of points (nx, ny)."""
     if material.fitted.long_modulus > 0.0:
         return
     asked = [("initial", initial.velocity)] if initial.state == "steady" else []

@@ -1,7 +1,7 @@
 """Warnings about the physics of a job, before it runs.
 
-They are about jobs outside of the theory, a linear half space with small slopes and strains. Slopes, heights, pressures
-and radii are bounded from below, so that sound jobs get no warning.
+The warnings concern jobs outside of the theory, a linear half space with small slopes and strains. Slopes, heights,
+pressures and radii are lower bounds, so that sound jobs get no warning.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class Body(Part):
 
 
 def _is_thick_enough(body: Any, grid: Any) -> Iterator[Fault]:
-    """Check that a layer in a free box has at least two cells, and that its compliance does not underflow."""
+    """Yield an error if a layer in a free box is thinner than two cells, or if the compliance of a layer underflows."""
     least, of_box = 2 * max(grid.dx, grid.dy), THINNEST * max(grid.size)
     if body is not None and grid.boundary == "free" and body.thickness < least:
         sentence = f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free"
@@ -46,7 +46,8 @@ def _is_thick_enough(body: Any, grid: Any) -> Iterator[Fault]:
 
 
 def _has_a_kernel(body: Any, grid: Any, material: Any, initial: Any, steady: Any) -> Iterator[Fault]:
-    """Refuse boxes that are free along y only, and steady sliding in free boxes or of a body that flows."""
+    """Yield an error for a box that is free along y only, and for steady sliding in a free box or of a body that
+    flows."""
     if body is None:
         return
     yield from limits.no_strip("a layer (body)", grid)
