@@ -19,7 +19,7 @@ The wake of an isolated contact is not periodic: influence coefficients are inte
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 from typing import Any, Literal
 
@@ -56,17 +56,13 @@ LEAST_SYMBOL = 1e-6  # accuracy: least compliance of a wave in a table, over tha
 UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as stiff as the square on average
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Response:
     """Response of the surface of a body of shear modulus 1 to pressure, here of a half space; effects may return that
     of another body (`effects.effect.Effect`). Wavenumbers q and lengths have one unit; arrays have any shape."""
 
-    poisson: float = 0.5
-
-    @property
-    def depth(self) -> float:
-        """Thickness of the body."""
-        return math.inf
+    thickness: float = math.inf
+    poisson: float = field(default=0.5, kw_only=True)
 
     @property
     def mean_compliance(self) -> float:

@@ -77,7 +77,7 @@ from ...physics.prony import Exponentials, Prony, complex_modulus, fit_exponenti
 Vector = tuple[float, float]
 SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: waves m along the depth: spacing of ln m; limits over q
 BINS = 16  # accuracy: bins of wavenumbers per octave; the error of flash temperatures is 1e-4
-DEEPEST = 3.0  # physics: least wavenumber times depth of the body: heat lies at most half of it deep
+DEEPEST = 3.0  # physics: least wavenumber times thickness of the body: heat lies at most half of it deep
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, veloci
 
     `unit` [m] is the length unit of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with its compliance A and
     frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. The heat is at most half the
-    depth of the body deep.
+    thickness of the body deep.
     """
     longest = max(body.size)
     bins = 1 + int(BINS * (1.0 + np.log2(np.hypot(fft.mx, fft.my))))
@@ -204,7 +204,7 @@ def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, veloci
     powers, moments = np.reshape(fft.slab.sum(*sums.ravel()), sums.shape)
     there = powers > 0.0
     found = moments[there] / powers[there] / unit
-    found = np.maximum(found, DEEPEST / (body.response.depth * unit))
+    found = np.maximum(found, DEEPEST / (body.response.thickness * unit))
     return Depths(found, powers[there] / powers.sum() if there.any() else powers[there])
 
 

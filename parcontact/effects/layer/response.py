@@ -78,12 +78,7 @@ class LongWaves:
 class Layer(Response):
     """A layer of shear modulus 1 and `thickness` [any unit of length] on a rigid base."""
 
-    thickness: float
     base: Base = "bonded"
-
-    @property
-    def depth(self) -> float:
-        return self.thickness
 
     def compliance_ratio(self, q: Array) -> Array:
         """Return the compliance ratio S(q d) of the module for wavenumbers q > 0; 0 for q = 0."""

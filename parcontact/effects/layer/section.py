@@ -15,7 +15,7 @@ from ...job.advice import more_points
 from ...job.parts import Part, rules_of
 from ...job.quantities import Positive
 from ...job.stages import Stage
-from ...job.surfaces import Flat, Rough, Sphere, Wave
+from ...job.surfaces import Flat, Rough, Sphere, Wave, wave_numbers
 from ...job.yaml_text import Fault
 from ...printed import rounded_up
 
@@ -103,7 +103,8 @@ def doubts_of_layer(job: Any) -> Iterator[Doubt]:
         yield WARN_THIN("body.thickness", numbers)
     yield from _too_high(job, _least_height(surface))
     yield from _indented(surface, body.thickness, job.history)
-    longest = max(_wavelengths(grid, surface), default=0.0)
+    waves = (wave_numbers(shape, grid) for shape in surface if isinstance(shape, Wave | Rough))
+    longest = max((2 * math.pi / min(each) for each in waves if each), default=0.0)
     if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
         numbers = {"wave": longest, "times": LONGEST, "thickness": body.thickness, "poisson": poisson}
         yield WARN_INCOMPRESSIBLE("material.poisson", numbers)
@@ -156,11 +157,3 @@ def _least_height(surface: tuple[Any, ...]) -> float:
             by_slope = (shape.rms_slope or 0.0) * shape.short_wavelength / (2 * math.pi)
             square += max(shape.rms_height or 0.0, by_slope) ** 2
     return 2.0 * math.sqrt(square)
-
-
-def _wavelengths(grid: Any, surface: tuple[Any, ...]) -> Iterator[float]:
-    for shape in surface:
-        if isinstance(shape, Wave) and any(shape.waves):
-            yield 1.0 / math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
-        elif isinstance(shape, Rough):
-            yield shape.long_wavelength
