@@ -80,3 +80,10 @@ def test_waves_to_which_rubber_is_compressible() -> None:
     assert warnings(0.99e-4, surface, grid=grid, body={"base": "smooth"}) == []
     rubber = {"model": "elastic", "shear_modulus": 1e6, "poisson": 0.4995}
     assert warnings(0.99e-4, surface, grid=grid, material=rubber) == []
+
+
+def test_the_longest_wave_of_a_roughness_lies_along_its_grooves() -> None:
+    """It is `ratio` times as long as `long_wavelength`, here as long as the box: 101 thicknesses."""
+    for ratio, count in ((1.0, 0), (2.0, 1)):
+        surface = {**ROUGH, "rms_height": 1e-7, "anisotropy": {"ratio": ratio}}
+        assert sum("more than 100 times" in text for text in warnings(0.99e-5, surface)) == count
