@@ -1,9 +1,10 @@
 """Results of a slide: its highest friction, its dynamic friction, and its contact area.
 
-The slide of a history is its last part at one non-zero velocity, which may extend over several stages. As in the paper
-(Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its
-distance. Steady sliding may need a longer slide (`parcontact steady` solves it directly). Rows in which the contact
-reaches the edge of the box do not count. The slide is then incomplete, so that no errors are known.
+The slide of a history is its last part at one non-zero velocity under one load: the last stage that slides, with those
+before it that have the same velocity and the same constant load. As in the paper (Sec. 3.1), mu_max is the highest
+friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady sliding may need a
+longer slide (`parcontact steady` solves it directly). Rows in which the contact reaches the edge of the box do not
+count. The slide is then incomplete, so that no errors are known.
 """
 
 import math
@@ -282,8 +283,14 @@ def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
 def _slide(history: Sequence[Stage]) -> range:
     """Return the indices of the stages of the slide; none where nothing slides."""
     last = max((index for index, stage in enumerate(history) if stage.slides and stage.seconds), default=-1)
-    same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
-    return range(min(same, default=0), last + 1)
+    same = takewhile(lambda index: _goes_on(history[index], history[last]), range(last, -1, -1))
+    return range(min(same, default=max(last, 0)), last + 1)
+
+
+def _goes_on(stage: Stage, last: Stage) -> bool:
+    """Return True if the last stage of a slide has the motion and the constant load of an earlier stage."""
+    earlier, later = ((one.velocity, one.control, one.load) for one in (stage, last))
+    return earlier == later and last.load.constant
 
 
 def _inside(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -53,6 +53,19 @@ def test_all_stages_at_one_velocity_are_one_slide() -> None:
     assert math.isnan(found.contact_area_corrected)
 
 
+@pytest.mark.parametrize(
+    ("heavier", "way", "mean"), [(2.0, 3.0, 4.0625 / 2.25), ({"from": 1.0, "to": 2.0}, 2.0, 2.625 / 1.5)]
+)
+def test_a_slide_has_one_load(heavier: Any, way: float, mean: float) -> None:
+    """Where a slide goes on under another load, results are those under the last one, or of the last ramp of load."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2), (2.5, 3, 1), (3.0, 4, 3))
+    last = {**CLIMB, "pressure": heavier}
+    found = measure_slide(stages(REST, CLIMB, last, {**last, "duration": 1.0}), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_max_distance) == (3.0, way)
+    assert found.mu_dyn == pytest.approx(mean, rel=1e-14)
+
+
 def test_rows_that_the_box_cuts_off_do_not_count() -> None:
     """The results are those of the rows before, and no error is known: the slide is not whole."""
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 7))
