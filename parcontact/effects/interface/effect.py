@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
 from ...columns import added_by
@@ -42,11 +42,18 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
         law: Interface = job.section("interface")
         return None if law.stick else law.friction(job.material)
 
+    def __init__(self, scene: Any) -> None:
+        self._energies = bool(scene.job.output.energy)
+
     def at_rest(self) -> tuple[float, float]:
         return 0.0, 0.0
 
     def follow(self, instant: Instant, memory: tuple[float, float]) -> Changes[tuple[float, float]]:
         return Changes(shares(instant.measures, instant.step.velocity))
+
+    def last_lines(self, memory: tuple[float, float]) -> Iterator[str]:
+        if self._energies:
+            yield "friction of the interface heats the surface: it is no part of work and dissipated"
 
     def values(self, memory: tuple[float, float]) -> Sequence[float]:
         return memory

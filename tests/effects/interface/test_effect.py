@@ -57,6 +57,16 @@ def test_parts_are_along_the_force() -> None:
     assert shares(Measures(), (1.0, 0.0)) == (0.0, 0.0)
 
 
+def test_energies_leave_out_the_friction() -> None:
+    """The work is that on the body, as without an interface, and the end of a run says so."""
+    (plain, _), (added, rows) = (marched(job(interface=one, output={"energy": True})) for one in (None, CONSTANT))
+    assert rows[-1].work == plain.state.row.work
+    said = [*added.scene.effects["interface"].last_lines(added.state.memories["interface"])]
+    assert said == ["friction of the interface heats the surface: it is no part of work and dissipated"]
+    silent = marched(job(interface=CONSTANT))[0]
+    assert not [*silent.scene.effects["interface"].last_lines(silent.state.memories["interface"])]
+
+
 def test_rest_has_none() -> None:
     rows = marched(job(history=[{"pressure": PRESSURE}, SLIDE], interface=CONSTANT))[1]
     assert rows[1].measures.friction < 1e-12  # sums of a pressure solved to 1e-10
