@@ -235,7 +235,10 @@ MEASURES: Table = (
     Column("iterations", "", "of the contact solver"),
     *CERTIFIED,
     Column("operator_calls", "", "applications of the half-space operator or its inverse in the step"),
-    Column("work", "J", "done on the body since the start (`output.energy`)"),
+    Column(
+        *("work", "J"),
+        "done on the body since the start (`output.energy`); without friction of an `interface` that does not stick",
+    ),
     Column("stored", "J", "elastic energy in the body"),
     Column("dissipated", "J", "turned to heat since the start"),
     Column("seconds", "s", "wall time of the step", lambda row: round(row.seconds, 6)),
@@ -352,7 +355,7 @@ CYCLES: Table = (
         "loss",
         "J",
         "area of the loop of force over displacement without the mean force; in a cycle that repeats "
-        "the last one, the energy dissipated",
+        "the last one, the energy dissipated. From `work` if nothing moves along the surface (`output.energy`)",
     ),
     Column("error_loss", "", "estimated relative error of the loss"),
     Column("friction_amplitude", "", "half the range of friction along the velocity; empty if nothing slides"),
@@ -393,7 +396,7 @@ def _in_row(column: Column) -> Column:
 
 
 SWEEP_RESULTS: Table = (
-    Column("mu_max", "", "highest friction of the slide (the last part of the history at one velocity)"),
+    Column("mu_max", "", "highest friction of the slide (the last part of the history at one velocity and load)"),
     Column("mu_max_distance", "m", "distance from the start of the slide to `mu_max`"),
     Column("mu_dyn", "", "mean friction over the last three quarters of the slide"),
     Column("contact_area", "", "mean over the same part; without a slide, its last value"),

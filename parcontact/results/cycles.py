@@ -9,9 +9,13 @@ with <F> the mean force over the cycle, as creep under the mean force is no part
 last one dissipates W. `phase` is the angle [rad] by which the first harmonic of s lags behind that of F: 0 for an
 elastic body.
 
-Between two rows F and s are Hermite's cubics with slopes by differences. The error of W has up to four parts:
+Where nothing moves along the surface, int F ds is the change of `work`, if energies are saved. Otherwise F and s are
+Hermite's cubics between two rows, with slopes by differences, at most STEEP times the smaller slope of both steps. The
+error of W has up to five parts:
 
 * by this interpolation: the difference to interpolation over pairs of steps, divided by its order of at least three;
+* by jumps of F, steps STEEP times as steep as both neighbours: half the product of both changes, as the jump may be
+  anywhere in its step; by interpolation the same for two steps on each side, where F turns like a root;
 * if something slides, the error of friction, weighted with the force;
 * else by the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`), times
   HARMONICS;
@@ -25,6 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..columns import CYCLES, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of
@@ -44,6 +49,7 @@ NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.lege
 HARMONICS = 2.0  # fitted: errors of steps over those of one harmonic (tests/summary/test_cycles.py)
 NOISE = 2.0  # fitted: error of independent solves over that of one (tests/summary/test_cycles.py)
 MESH = 0.3  # fitted: error of the loss over that of the area, 0.25 at most (tests/summary/test_cycles.py)
+STEEP = 3.0  # accuracy: ratio of slopes up to which a cubic between two rows stays between them
 NO_PHASE = 1e-100  # rounding: sine of the phase of a body that loses nothing
 Columns = Mapping[str, Sequence[float]]
 
@@ -97,10 +103,11 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
         force, place = area * cycle["pressure"], cycle["approach"]
     else:
         force, place = along, way
-    loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), _every_second(time.size)))
+    work = math.nan if stage.speed else _gain(cycle.get("work"))
+    loss, between = _by_work(work, time, force, place) if math.isfinite(work) else _by_rows(time, force, place)
     phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
     phase = math.remainder(phase, 2.0 * math.pi)
-    error = abs(rough - loss) / PAIRS / abs(loss) if loss else math.nan
+    error = between / abs(loss) if loss else math.nan
     if way is None:
         error += _load_error(job, stage, cycle, phase)
     else:
@@ -117,6 +124,35 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
         0.5 * float(np.ptp(cycle["approach"])),
         phase,
     )
+
+
+def _gain(work: Array | None) -> float:
+    """Return the change of work over a cycle [J]; NaN without energies."""
+    return math.nan if work is None else float(work[-1] - work[0])
+
+
+def _by_work(work: float, time: Array, force: Array, place: Array) -> tuple[float, float]:
+    """Return the loss of a cycle from the work of its load, and its error by jumps of the force [J]."""
+    return work - _mean(time, force) * float(place[-1] - place[0]), _within(force, place, _jumps(time, force))
+
+
+def _by_rows(time: Array, force: Array, place: Array) -> tuple[float, float]:
+    """Return the loss of a cycle from force and displacement, and its error by interpolation and jumps [J]."""
+    loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), _every_second(time.size)))
+    near = np.convolve(_jumps(time, force), np.ones(5), "same") > 0.0
+    return loss, abs(rough - loss) / PAIRS + _within(force, place, near)
+
+
+def _jumps(time: Array, force: Array) -> NDArray[np.bool_]:
+    """Return a mask of the steps between rows that are STEEP times as steep as both neighbours."""
+    slopes = np.abs(np.diff(force) / np.diff(time))
+    before, after = np.append(slopes[1], slopes[:-1]), np.append(slopes[1:], slopes[-2])
+    return slopes > STEEP * np.maximum(before, after)
+
+
+def _within(force: Array, place: Array, steps: NDArray[np.bool_]) -> float:
+    """Return by how much the trapezoids of some steps differ at most from integrals of a monotonic force [J]."""
+    return 0.5 * float(np.sum(np.abs(np.diff(force) * np.diff(place))[steps]))
 
 
 def _mean_error(errors: Array, weights: Array) -> float:
@@ -216,9 +252,9 @@ def _every_second(count: int) -> Array:
 def _over_time(time: Array, *values: Array) -> tuple[Array, list[tuple[Array, Array]]]:
     """Return weights [s] of instants, and the values and their rates at the instants."""
     dt, s = np.diff(time)[:, None], NODES[None, :]
-    found = []
+    found = list[tuple[Array, Array]]()
     for each in values:
-        rate = np.gradient(each, time, edge_order=2)
+        rate = _rates(time, each)
         old, new = each[:-1, None], each[1:, None]
         left, right, change = dt * rate[:-1, None], dt * rate[1:, None], new - old
         at = old + s * left + s**2 * (3 * change - 2 * left - right) + s**3 * (left + right - 2 * change)
@@ -227,11 +263,23 @@ def _over_time(time: Array, *values: Array) -> tuple[Array, list[tuple[Array, Ar
     return dt * WEIGHTS[None, :], found
 
 
+def _rates(time: Array, values: Array) -> Array:
+    """Return slopes at the rows by differences, at most STEEP times the smaller slope of both steps."""
+    slopes = np.abs(np.diff(values) / np.diff(time))
+    most = STEEP * np.minimum(np.append(slopes[0], slopes), np.append(slopes, slopes[-1]))
+    return np.clip(np.gradient(values, time, edge_order=2), -most, most)
+
+
+def _mean(time: Array, force: Array) -> float:
+    """Return the mean over a cycle."""
+    weights, ((found, _),) = _over_time(time, force)
+    return float(np.sum(weights * found)) / float(time[-1] - time[0])
+
+
 def _loop(time: Array, force: Array, place: Array) -> float:
     """Return the area of a loop."""
     weights, ((f, _), (_, rate)) = _over_time(time, force, place)
-    mean = float(np.sum(weights * f)) / float(time[-1] - time[0])
-    return float(np.sum(weights * (f - mean) * rate))
+    return float(np.sum(weights * (f - _mean(time, force)) * rate))
 
 
 def _harmonic_angle(time: Array, values: Array, frequency: float) -> float:

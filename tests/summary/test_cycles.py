@@ -152,6 +152,28 @@ def test_given_steps_move_to_and_fro() -> None:
     assert np.allclose(moved, [step.position for step in steps], atol=1e-12)
 
 
+@pytest.mark.parametrize("steps", [{}, {"time_step": 0.01}])
+def test_snaps_are_in_the_loss(steps: dict[str, Any]) -> None:
+    """An elastic ball with adhesion that snaps into and out of contact returns to its state in each cycle, so that its
+    loss is that of the snaps. Force and approach alone show it within their error."""
+    swing = {"approach": {"mean": -1e-5, "amplitude": 3e-5, "frequency": 1.0}, "cycles": 1, **steps}
+    scene = {
+        "grid": {"points": 32, "size": 2e-3, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 8e-3},
+        "material": {"model": "elastic", "shear_modulus": 5e4},
+        "adhesion": {"work": 0.05},
+        "history": [{"approach": {"from": -4e-5, "to": -1e-5}, "duration": 1.0}, swing],
+        "output": {"energy": True},
+    }
+    job = Job.model_validate(scene)
+    rows = marched(job)[1]
+    lost = [row.added[-1] for row in rows if row.time >= 1.0 - 1e-9]
+    seen = table(rows)
+    (by_work,), (by_rows,) = find_cycles(job, {**seen, "work": column(rows, "work")}), find_cycles(job, seen)
+    assert by_work.loss == pytest.approx(lost[-1] - lost[0], rel=1e-2)
+    assert abs(by_rows.loss - by_work.loss) <= by_rows.error_loss * by_rows.loss
+
+
 def test_restart_within_a_cycle(comm: MPI.Intracomm, tmp_path: Path) -> None:
     """A run that is cut within its second stage goes on bit for bit, with the same cycles.csv."""
     bench, whole = Bench(comm, tmp_path), tmp_path / "whole"
