@@ -166,8 +166,8 @@ def _is_number(word: str) -> bool:
 def number_rows(path: Path, lines: Iterable[str]) -> tuple[list[str], Iterator[tuple[int, list[float]]]]:
     """Return the lines above the first row of numbers, and each row with the number of its line.
 
-    Blank lines and comments between rows are passed over. Without a row in the first LONGEST_HEAD lines there are no
-    rows. Rows raise InputError for a text that is not a number.
+    Blank lines and comments between rows are passed over. If the first LONGEST_HEAD lines have no row, no rows are
+    returned. Rows raise InputError for a text that is not a number.
     """
     numbered = enumerate(lines, start=1)
     start = list(islice(numbered, LONGEST_HEAD))
@@ -225,8 +225,8 @@ def read_named_columns(
 ) -> Table:
     """Return the columns of a table whose columns have names.
 
-    Columns with a name of `names` must hold numbers, and others are ignored. `enough` decides whether the names in a
-    line are those of a header. Columns with a name of `plain` need no unit. Raises InputError with file and line.
+    Columns with a name of `names` must hold numbers, and others are ignored. `enough(names)` returns True if the names
+    in a line make it a header. Columns with a name of `plain` need no unit. Raises InputError with file and line.
     """
     lines = _read_lines(path, expected)
     rows = [(number, text) for number, text in lines if COMMENT.sub("", text).strip(" \t,;")]

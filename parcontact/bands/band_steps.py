@@ -91,7 +91,7 @@ class BandClock:
         """Return the numbers of the steps before and after a place, and the share of the step after.
 
         Results vary linearly with the slip of a slide, and with the logarithm of the time of a rest. Beyond the last
-        step of a stage results are constant; before the first step they are the last ones of the stage before.
+        step of a stage results are constant; before the first step they are the last results of the stage before.
         """
         own = [index for index, place in enumerate(self.places) if place.stage == at.stage]
         after = next((index for index in own if self.places[index].elapsed >= at.elapsed), own[-1])

@@ -170,17 +170,18 @@ class Shares(NamedTuple):
 
 
 def by_load(shares: Shares) -> Array:
-    """Return the weights of the rungs of a ladder in a mean weighted by load."""
+    """Return the weights of the pressures of a ladder in a mean weighted by load."""
     return shares.loads / shares.loads.sum()
 
 
 def by_square(shares: Shares) -> Array:
-    """Return the weights of the rungs in a mean over load times pressure, divided by the mean pressure squared."""
+    """Return the weights of ladder pressures in a mean over load times pressure, divided by the mean pressure
+    squared."""
     return shares.loads * shares.pressures / shares.mean**2
 
 
 def by_power(shares: Shares) -> Array:
-    """Return the weights of the rungs of a ladder in a mean weighted by power; 0 without power."""
+    """Return the weights of the pressures of a ladder in a mean weighted by power; 0 without power."""
     weights = np.maximum(shares.power, 0.0)
     return np.asarray(weights / max(float(weights.sum()), TINY))
 
@@ -345,7 +346,7 @@ class Cascade:
 
 
 def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:
-    """Return the rungs of a band, averaged over samples."""
+    """Return the results of a band at all pressures of its ladder, averaged over samples."""
     each = zip(*(found[band, sample] for sample in samples), strict=True)
     return [_mean(rungs) for rungs in each]
 

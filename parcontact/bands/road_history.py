@@ -133,7 +133,7 @@ class RoadHistory(RoadSliding):
         return self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
-        """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""
+        """Return all calculations (marches) of each band, from the finest to the coarsest, with hard walls last."""
         found = list[list[RungTask]]()
         for number in reversed(range(self.cut.count)):
             count, half = (len(each.ladders[number].rungs) for each in (self._cascade, self._hard))

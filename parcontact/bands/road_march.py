@@ -33,8 +33,9 @@ class BandMarch:
     def march(
         self, pressure: float, law: LawAt | None, place: Callable[[Step], Place], below: PressureLadder | None
     ) -> Rung:
-        """Return the track under a mean pressure [Pa], with the distribution of pressure over `below`, the ladder of
-        the next finer band. Without a `law` finer bands are absent. Raises RunError if a step fails."""
+        """Return the results at all places of the history under a mean pressure [Pa], with the distribution of pressure
+        over `below`, the ladder of the next finer band. Without a `law` finer bands are absent. Raises RunError if a
+        step fails."""
         scene, rows = self.scene, list[Rung]()
         scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
         march = self._begin(pressure, law)
@@ -69,13 +70,13 @@ class BandMarch:
 
 
 def track_of(rows: Sequence[Rung]) -> Rung:
-    """Return rungs at successive places as one track, whose arrays have the place as first axis."""
+    """Return the results at successive places of a history as one `Rung`, whose arrays have the place as first axis."""
     values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
     return Rung(**values, found={})
 
 
 def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
-    """Return the rung interpolated between two places of a track; friction is taken along `sign` times x."""
+    """Return the results of `track` interpolated between two places; friction is taken along `sign` times x."""
 
     def between(values: Any) -> Any:
         return (1.0 - share) * values[before] + share * values[after]

@@ -105,7 +105,7 @@ class BandLoop(Protocol):
 class RoadSliding:
     """Steady states of a job in bands, on the ranks of `slab`; the constructor and the methods are collective.
 
-    The methods are those of `march.steady.SteadySliding` for friction curves.
+    For friction curves it has the same methods as `march.steady.SteadySliding`.
     """
 
     table: tuple[str, Sequence[str]] | None

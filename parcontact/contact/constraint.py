@@ -169,7 +169,7 @@ STEPS = 6  # accuracy: linear pieces in each interval of a table, equal in the l
 class InterfaceLaw:
     """Closing c(p) of an interface, piecewise linear with c(0) = 0, and constant beyond the last point.
 
-    `pressures`, shape (n,), rise from 0, and `closings`, of the same shape, do not fall. Units are those of the caller.
+    `pressures`, shape (n,), rise from 0, and `closings`, of the same shape, do not fall. Both may have any unit.
     """
 
     pressures: Array

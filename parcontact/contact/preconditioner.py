@@ -198,8 +198,8 @@ class CellLevel:
 
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
-    """Return the steps from a grid to coarser ones up to a single cell, the finest first. The first `pairs` steps join
-    pairs of cells, all others two by two."""
+    """Return the steps from a grid to a single cell, the finest first. The first `pairs` steps join pairs of cells, all
+    further steps two by two cells."""
     return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
 
 
@@ -221,8 +221,8 @@ Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each 
 
 
 class Grids(NamedTuple):
-    """Coarser grids for a preconditioner: at most `most`, or all if it is None. The first `pairs` of them double cells
-    along one side only (`cell_levels`)."""
+    """Coarser grids for a preconditioner: at most `most`, all if None. The first `pairs` grids double cells along one
+    side only (`cell_levels`)."""
 
     most: int | None = None
     pairs: int = 0

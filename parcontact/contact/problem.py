@@ -18,7 +18,7 @@ from .constraint import Box
 
 
 class Operator(Protocol):
-    """Linear operator on maps. `out` may be the map `field` itself. Applying it is collective."""
+    """Linear operator on maps. `out` may be the map `field` itself. Calls are collective."""
 
     def apply(self, field: Array, out: Array) -> Array: ...
 

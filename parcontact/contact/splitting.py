@@ -334,8 +334,8 @@ PATIENCE = 5  # tuning: limit on projected steps in which the certificate must h
 
 
 class SteadySolver:
-    """Solver of steady sliding in a periodic box. It holds the maps of `Projected` while it makes projected steps, and
-    those of `Splitting` afterwards.
+    """Solver of steady sliding in a periodic box. It holds the maps of `Projected` during projected steps, and the maps
+    of `Splitting` afterwards.
 
     Parameters: `operator` A; `preconditioner` K near its inverse; `tolerance` on the certificate; `most`, a limit on
     the steps of `Splitting`; `grids`, the coarser grids of projected steps (`preconditioner.grids_for`).

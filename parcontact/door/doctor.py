@@ -224,7 +224,7 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
 
 
 def prepare_loops(comm: "MPI.Intracomm") -> str:
-    """Run small jobs so that loops that checks do not need are compiled, too; return a line of text. Collective.
+    """Run small jobs to compile loops which the checks do not use; return a line of text. Collective.
 
     The jobs slide steadily, slide in mixed precision, and adhere in periodic and free boxes. Effects compile their own
     loops.

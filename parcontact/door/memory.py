@@ -93,7 +93,7 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def steady_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
-    """Return the largest memory of a rank in maps [bytes] during the initial steady state, or those of a curve."""
+    """Return the largest memory of a rank in maps [bytes] during the initial steady state, or a point of a curve."""
     slab = _slab(job, ranks, rank)
     first = choices(job).steady_start.on
     most = tolerance_before(job, 0, choices(job).viscoelasticity.on) if first else math.inf
@@ -268,7 +268,7 @@ class Trial:
     """Costs of a `job`, measured in a trial on `ranks` ranks, for each stage, or for all steady states as one stage.
 
     `points` are the points of the grid that was tried, `building` is the time in which its scene was set up [s], and
-    `price` the time of its transforms divided by N log N, in the end relative to the price on the grid of the job.
+    `price` the time of its transforms divided by N log N; in the end the ratio to this time on the job's grid.
     """
 
     job: Job
@@ -368,7 +368,7 @@ def _coarser(job: Job) -> Iterator[Job]:
 
 
 def warm_up(job: Job, slab: Slab) -> float:
-    """Make the first steps, or steady states, of a tiny scene, so that later ones include no compilation. Return the
+    """Make the first steps, or steady states, of a tiny scene, so that later steps include no compilation. Return the
     time [s] of an operator call in this scene; collective."""
     small = _tiny(job)
     if small is None:

@@ -352,7 +352,7 @@ def estimate_errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[st
 
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Return the errors, each raised to the uncertainty of its reference if that is larger."""
+    """Return the errors; an error below the uncertainty of its reference is replaced by this uncertainty."""
     return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 

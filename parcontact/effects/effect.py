@@ -148,8 +148,8 @@ def nothing_holds(control: str, load: float) -> str:
 class ContactLaw(Protocol[Memory]):
     """A contact law, a part of the run. Methods are collective.
 
-    A law that extends the usual contact, which only bounds the pressure, may have a method `upon`, which takes the
-    usual law and returns the extended one.
+    The usual law only bounds the pressure. A law that extends it may have a method `upon`, which takes the usual law
+    and returns the extended law.
     """
 
     may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
@@ -344,7 +344,7 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the lengths [m] that the effect chooses by the mesh, by their keys."""
+        """Return the lengths [m] that the effect chooses by the mesh, by the names of their keys."""
         return {}
 
     @staticmethod
@@ -412,8 +412,8 @@ class Effect(Protocol[Memory]):
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of a memory, by name; maps are those of the memory, or made for the
-        checkpoint."""
+        """Return the checkpoint entries of a memory, by name; maps belong to the memory or are made for this
+        purpose."""
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:

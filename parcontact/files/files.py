@@ -81,7 +81,7 @@ def is_marked(path: Path) -> bool:
 def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
     """Rename an existing file with a warning, unless it is a regular file of this program.
 
-    Raises PermissionError for a device or a pipe, such as /dev/null, which others use.
+    Raises PermissionError for a device or a pipe, such as /dev/null.
     """
     if os.path.lexists(path) and not (path.is_symlink() or path.is_file() or path.is_dir()):
         raise PermissionError(errno.EPERM, "it is a device or a pipe, which is not replaced", str(path))

@@ -202,7 +202,7 @@ def choose_points(
 ) -> tuple[int, int]:
     """Return the numbers of points along x and y of the smallest mesh that meets the accuracies `asked`, for a surface
     with this shortest wave [m] that slides along `directions` (unit vectors), or does not slide. Of equally large
-    meshes, the one with the shortest longer side is returned."""
+    meshes, the mesh with the shortest longer side is returned."""
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
     x, y = (wave / length for length in size)

@@ -80,7 +80,8 @@ def longest_change(stage: Stage) -> float:
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """Return the bounds on steps of a stage that slide by at most `cells`, at rest at most the whole stage."""
+    """Return the limits on steps of a stage: while it slides, at most `cells` cells; at rest, at most the whole
+    stage."""
     most = longest_change(stage)
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)

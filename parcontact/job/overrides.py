@@ -59,7 +59,7 @@ class Sweep:
 
 
 def take_sweep(source: Source) -> Sweep | None:
-    """Remove the sweep from the data of a job and return it; None if it has mistakes, which are noted in `source`."""
+    """Remove the sweep from the data of a job and return it; None for a sweep with mistakes, which `source` notes."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)

@@ -58,7 +58,7 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 
 
 class Rule(NamedTuple):
-    """A check of the fields in `needs`; it runs if all of them are correct (wrong items of lists are None)."""
+    """A check of the fields in `needs`; it runs if all these fields are correct (wrong items of lists are None)."""
 
     needs: tuple[str, ...]
     check: Callable[..., Iterator[Fault]]
@@ -94,11 +94,11 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return the part as the job gives it; effects may have replaced it by this part."""
+        """Return this part as it was in the job, before effects replaced it."""
         return self
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the keys that are not written although they have a value."""
+        """Return the keys that are not written to the stored job although they have a value."""
         return ()
 
     @classmethod

@@ -85,7 +85,7 @@ def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = l
 
 
 def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
-    """Return all cases, or the one with a number; raises InputError if there is none."""
+    """Return all cases, or only the case with a number; raises InputError if there is none."""
     if number is None:
         return cases
     if not cases[0].settings:

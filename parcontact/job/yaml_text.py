@@ -169,7 +169,7 @@ def list_words(words: Iterable[str]) -> str:
 
 
 def closest(word: Any, words: Iterable[str]) -> str:
-    """Return the one of `words` that is closest to a misspelt `word`, '' if none is close."""
+    """Return the word of `words` that is closest to a misspelt `word`, '' if none is close."""
     if len(str(word)) > MAX_WORD:
         return ""
     known = {candidate.lower(): candidate for candidate in words}
@@ -275,7 +275,7 @@ def _remedy(problem: str) -> str:
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     """Return YAML text as a `Source`. Messages name the place of a value by `origin`, line and column; if `whole` is
-    given, it is the place of all values."""
+    given, all values have this place."""
     start = whole or Place(origin, 1, 1)
     source = Source(UNREADABLE, start)
     reader = _Reader(source, origin, whole)

@@ -347,7 +347,7 @@ class ErrorSums:
 
     @classmethod
     def restored(cls, saved: Saved) -> "ErrorSums":
-        """Return the sums of a checkpoint, or new ones if another version has written them."""
+        """Return the sums in a checkpoint, or new sums if the checkpoint is of another version."""
         own = cls()
         found = np.asarray(saved.get(SUMS, own.sums))
         return cls(found.reshape(own.sums.shape)) if found.size == own.sums.size else own
@@ -407,7 +407,7 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
 
 
 def exceeds(error: float, accuracy: float) -> bool:
-    """Return True if an estimated error exceeds the requested accuracy, also after both are rounded as printed."""
+    """Return True if an estimated error exceeds the requested accuracy, and its printed value the printed accuracy."""
     return error > ROUNDED * accuracy
 
 

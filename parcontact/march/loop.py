@@ -164,5 +164,5 @@ def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None 
 
 
 def run_tasks(march: March, tasks: Sequence[Task]) -> bool:
-    """Do all tasks. Return True if one of them ends the march."""
+    """Do all tasks. Return True if a task ends the march."""
     return any([task(march) for task in tasks])  # noqa: C419  # all tasks run, also when one ends the march

@@ -54,7 +54,7 @@ WARN_FREQUENCIES = Kind(
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
-    are those of a friction curve; without them the temperature of the material counts."""
+    belong to a friction curve; without a curve the temperature of the material counts."""
     if (body := _body(job)) is None:
         return
     if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job

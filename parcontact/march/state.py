@@ -372,7 +372,7 @@ class _ContactPart:
         return found
 
     def restored(self, memory: PreviousContacts, saved: Saved) -> PreviousContacts:
-        """Return the pressures of a checkpoint, whose maps have been read; missing ones are marked as unknown."""
+        """Return the pressures of a checkpoint, whose maps have been read; missing pressures are marked as unknown."""
         pasts = []
         for ago, past in enumerate(memory.pressures):
             known = all(_name(name, ago) in saved for name in ("pressure", "modulus", "position"))

@@ -174,8 +174,7 @@ class FFT:
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
     `dtype` float64 or float32 of calculations and messages, for maps of either type; `measured`: FFTW measures which
     algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: a transform of the same lengths in double
-    precision, in whose spectrum this one, in single precision, stores its own. The constructor and the methods are
-    collective.
+    precision, whose memory a transform in single precision shares. The constructor and the methods are collective.
     """
 
     def __init__(

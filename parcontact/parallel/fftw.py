@@ -33,7 +33,7 @@ __all__ = ["export_wisdom", "import_wisdom", "pyfftw"]
 
 
 def export_wisdom() -> bytes:
-    """Return the algorithms that FFTW has chosen in this process; others, of another process, round differently."""
+    """Return the algorithms that FFTW has chosen in this process; other algorithms would round differently."""
     return SEPARATOR.join(pyfftw.export_wisdom())
 
 

@@ -56,7 +56,7 @@ class RowExchange:
     @staticmethod
     def of_numbers(slab: Slab, wanted: NDArray[np.integer], rank: int) -> "RowExchange":
         """Return the exchange of a few rows: `wanted` has row numbers for each rank, shape (ranks, count); `rank` is
-        this one."""
+        this rank."""
         own, rows = wanted[rank], slab.rows
         asked = wanted if slab.comm.size > 1 else wanted[[rank]]
         here, there = (asked >= rows.start) & (asked < rows.stop), (own >= 0) & (own < slab.ny)
@@ -270,8 +270,8 @@ def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int
 
 
 def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
-    """Return a function of the rank that returns the rows of cells, each `tall` fine rows high, that end in this rank's
-    rows of the finer grid."""
+    """Return a function of the rank: it returns the slice of cells, `tall` fine rows high, whose last row is on the
+    rank."""
     if tall == 1:
         return fine.rows_of
     last = fine.comm.size - 1

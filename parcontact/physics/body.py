@@ -205,8 +205,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus alpha with the effective heights `h + r/alpha`; local to this rank. The step replaces
-        another one that has begun from the same memory.
+        """Begin a step of modulus alpha with the effective heights `h + r/alpha`; local to this rank. It replaces any
+        step that has begun from the same memory.
 
         `growth` is dt over the length of the step before; 0 after a jump and in the first step of a stage.
         """

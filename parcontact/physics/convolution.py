@@ -122,7 +122,7 @@ class MirroredConvolution:
 
     @cached_property
     def symbols(self) -> Symbols:
-        """The symbols, made at the first use."""
+        """The symbols for all blocks of columns, made at the first use."""
         return _in_blocks(self.fft, self._part, self.fft.fft.complex, self.fft.my)
 
     def apply(self, field: Array, out: Array) -> Array:

@@ -283,8 +283,8 @@ INSTANT = 30.0  # accuracy: m above which a wave has no memory, over 1/sqrt(shor
 class Exponentials:
     """The sum of exponentials (1) for times from `shortest` to `longest` [s], with a relative error of at most `bound`.
 
-    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` have a memory; the others
-    follow the present heat. Waves above `end` [s^(-1/2)] are neglected. `first` and `spacing` are m_0 and h.
+    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` waves have a memory; all later
+    ones follow the present heat. Waves above `end` [s^(-1/2)] are neglected. `first` and `spacing` are m_0 and h.
     """
 
     rates: slab_Array

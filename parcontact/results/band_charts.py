@@ -299,7 +299,7 @@ Rows = Sequence[dict[str, Any]]
 
 
 def all_panels() -> Panels:
-    """Return all panels that a sweep may have, including those of effects, in the order of the columns of sweep.csv."""
+    """Return all panels that a sweep may have, with the panels of effects, in the order of the columns of sweep.csv."""
     found = (*PANELS, *offered("SWEEP_PANELS"))
     place = names_of(SWEEP).index
     return tuple(sorted(found, key=lambda panel: place(next(iter(panel.columns.values())))))

@@ -229,7 +229,7 @@ class Results:
             yield "the run is not finished"
 
     def failed_cases(self, most: int = 10**9) -> list[str]:
-        """Return sentences on at most `most` failed cases of a sweep, and one on the number of others."""
+        """Return sentences on at most `most` failed cases of a sweep, and a sentence on the number of further ones."""
         failed = [int(row["case"]) for row in self.cases if row["state"] == "failed"]
         found = [": ".join(filter(None, (f"case {one} failed", self._why_failed(one)))) for one in failed[:most]]
         return found + [f"and {len(failed) - most} more"] * (len(failed) > most)

@@ -159,7 +159,7 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
 def mean_of_slide(
     columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str
 ) -> tuple[float, float]:
-    """Return the mean of a column over the last three quarters of a slide, and of its errors, unknown ones as 0."""
+    """Return the mean of a column over the last three quarters of a slide, and of its errors; unknown errors are 0."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
     return mean_over_end(distance, values), mean_over_end(distance, within)
@@ -170,7 +170,7 @@ def describe_slide(
 ) -> Iterator[str]:
     """Yield sentences on the slide so far, from columns of the run; none before anything slides.
 
-    `cell` is the spacing of the grid along x [m]. Until the last slide begins, sentences are about the one before.
+    `cell` is the spacing of the grid along x [m]. Until the last slide begins, sentences are about the slide before.
     """
     last, begun = _slide(history), _begun(history, columns["time"])
     not_begun = begun <= last.start

@@ -70,8 +70,8 @@ CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten a
 class Rings:
     """Waves of a surface in rings of equal wavenumber, from the longest; `starts` is the first wave of each ring.
 
-    A panel has n rings; `share`, shape (n, n), has for each ring of a panel the shares of all its rings that lie within
-    this ring. `stiffness` is the ratio of the body's stiffness to that of a half space for each wave.
+    Rings are grouped in panels of n; `share[i, j]` is the share of ring j of a panel that lies within ring i.
+    `stiffness` is the ratio of the body's stiffness to that of a half space for each wave.
     """
 
     waves: Waves

@@ -128,7 +128,7 @@ class CounterbodyThatDeforms(Effect[None]):
 
 
 def frequencies(job: Any) -> list[float]:
-    """Return at most SHOWN frequencies [Hz] at which moduli are shown: those of the job's sliding, else those of the
+    """Return at most SHOWN frequencies [Hz] at which moduli are shown: frequencies of the job's sliding, else of the
     relaxation of the pair; an empty list if nothing relaxes."""
     times = relaxation_of(job.material).relaxation_times
     if not times.size:

@@ -246,8 +246,8 @@ def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
 
 
 def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
-    """Return the smallest gap on the widest path from end to end, and its row and column. The widest path is the one
-    whose smallest gap is largest.
+    """Return the smallest gap on the widest path from end to end, and its row and column. The widest path has the
+    largest smallest gap.
 
     Returns 0 and None if contact closes all paths. Cells are opened in the order of falling gaps until both ends are
     connected: the last cell opened is the constriction.

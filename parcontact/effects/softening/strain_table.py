@@ -40,13 +40,13 @@ class StrainTable:
 
     @staticmethod
     def mixed(found: ArrayLike, before: ArrayLike) -> Array:
-        """Return the strains of the next round of a fixed point from those `found` and those `before`; a strain that
+        """Return the strains for the next round of a fixed point, from the strains `found` and `before`; a strain that
         was not found (NaN or 0) remains."""
         new, old = np.asarray(found, float), np.asarray(before, float)
         return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
 
     def at(self, strain: float) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function of wavenumbers that returns the factors of one strain for all of them."""
+        """Return a function that maps wavenumbers to the factors of this strain, equal for all waves."""
         return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:

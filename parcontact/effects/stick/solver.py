@@ -72,7 +72,8 @@ ACROSS = 0.5  # tuning: least component of a traction across an axis, over the o
 
 @loop
 def shorten_to_bounds(bound, x, y, hit):
-    """Shorten the tractions (x, y) to their bounds, and mark those that `hit` them; a bound of 0 gives no traction."""
+    """Shorten the tractions (x, y) to their bounds, and mark in `hit` the shortened ones; a bound of 0 gives no
+    traction."""
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             size, most = math.hypot(x[j, i], y[j, i]), bound[j, i]
@@ -106,7 +107,7 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 
 @loop
 def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
-    """Divide points in contact into those that stick (marked in `free`) and those that slip.
+    """Divide points in contact into points that stick (marked in `free`) and points that slip.
 
     A point slips if its traction was shortened to its bound (`hit`), or `t + kappa w` exceeds the bound, and the slip
     `w = e - u` is not opposite to t. `turn` receives |w|/f of points that slip, along t.
@@ -215,8 +216,8 @@ def complete(
 @loop
 def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
     """Put the next tractions into (new_x, new_y), which hold the tractions before (x, y): `step z` and `again` times
-    the last change are added to (x, y). Tractions that slip keep their bounds; others are shortened to them. Return the
-    sum of the changes."""
+    the last change are added to (x, y). Tractions that slip keep the length of their bounds; other tractions are
+    shortened to their bounds. Return the sum of the changes."""
     change = 0.0
     for j in range(bound.shape[0]):
         row_change = 0.0
