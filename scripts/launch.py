@@ -21,7 +21,7 @@ from types import FrameType
 ASKS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1)
 SECONDS_TO_START = 1.0  # within which the launcher starts its ranks
 SECONDS_TO_SAVE = 600.0  # for the present step and a checkpoint
-SECONDS_TO_END = 15.0  # for the launcher to end its ranks, after two waits of 3 s each
+SECONDS_TO_END = 15.0  # for the launcher to end its ranks, after two waits of 2 s each
 PR_SET_PDEATHSIG = 1
 
 
