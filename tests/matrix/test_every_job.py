@@ -92,7 +92,7 @@ def test_a_job_from_check_to_going_on(name: str, place: Path) -> None:
     alone, job = MPI.COMM_WORLD.size == 1, small(name, place)
     if alone:  # what is checked and planned does not depend on ranks
         done("check", job)
-        done("plan", job, "--seconds", "0.4")
+        done("plan", job, "--seconds", "0.1")
     whole = run(place, job)
     assert any(name.endswith(("measures.csv", "steady.csv")) for name in whole)
     assert run(place, job) == whole
