@@ -57,7 +57,8 @@ def use(folder: str, commands: Sequence[Sequence[str]]) -> Iterator[tuple[int, s
     if folder:
         hide(folder)
     main = importlib.import_module("parcontact.__main__").main
-    importlib.import_module("parcontact.results.style").arrange = lambda figure: None
+    style: Any = importlib.import_module("parcontact.results.style")
+    style.arrange = lambda figure: None
     for words in commands:
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

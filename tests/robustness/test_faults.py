@@ -319,7 +319,7 @@ def test_signals_that_mpirun_hands_on(here: Path, number: signal.Signals) -> Non
     """A launcher is asked by SIGUSR1, whatever signal it was."""
     launcher = "trap 'exit 3' USR1; touch ready; while :; do sleep 0.05; done"
     words = [sys.executable, "-I", "-S", str(ROOT / "scripts/launch.py"), "sh", "-c", launcher]
-    process = subprocess.Popen(words, start_new_session=True)
+    process = subprocess.Popen(words, start_new_session=True, text=True)
     wait_for(process, (here / "ready").exists)
     process.send_signal(number)
     assert process.wait(timeout=SECONDS) == AGAIN
