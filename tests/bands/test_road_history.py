@@ -128,7 +128,7 @@ def test_rungs_that_remember_another_pressure_state_an_error(monkeypatch: pytest
             monkeypatch.setattr(road_history, "MEMORY", share)
             parts = [row.errors.friction if row.errors else None for row, _ in road.records()]
             each.append([part.method if part and slip else 0.0 for part, slip in zip(parts, slips, strict=True)])
-        return np.array(slips), np.subtract(*each)
+        return np.array(slips), np.subtract(each[0], each[1])
 
     rest, slide = JOB["history"]
     start = {"state": "steady", "velocity": 1.0, "pressure": 1e5}

@@ -215,7 +215,7 @@ def test_what_does_not_go_with_bands(changes: dict[str, object], sentence: str) 
     ("changes", "sentence"),
     [
         ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion cannot be used with bands: they are coupled"),
-        ({"material": {**JOB["material"], "hardness": 1e7}}, "material.hardness cannot be used with bands"),
+        ({"material": {"include": "synthetic_tyre", "hardness": 1e7}}, "material.hardness cannot be used with bands"),
     ],
 )
 def test_what_no_history_in_bands_has_is_one_mistake(changes: dict[str, object], sentence: str) -> None:
