@@ -169,7 +169,7 @@ def test_snaps_are_in_the_loss(steps: dict[str, Any]) -> None:
     rows = marched(job)[1]
     lost = [row.added[-1] for row in rows if row.time >= 1.0 - 1e-9]
     seen = table(rows)
-    (by_work,), (by_rows,) = find_cycles(job, {**seen, "work": column(rows, "work")}), find_cycles(job, seen)
+    (by_work,), (by_rows,) = find_cycles(job, {**seen, "work": column(rows, "work").tolist()}), find_cycles(job, seen)
     assert by_work.loss == pytest.approx(lost[-1] - lost[0], rel=1e-2)
     assert abs(by_rows.loss - by_work.loss) <= by_rows.error_loss * by_rows.loss
 

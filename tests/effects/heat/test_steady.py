@@ -203,11 +203,11 @@ def test_bands_warm_each_other_equally() -> None:
     """Heat of band i warms band k as the same heat of band k warms band i (reciprocity of conduction), heat of the
     interface warms all as that of a finest band on the surface, and waves of finer bands do not warm a coarser one."""
     draw = np.random.default_rng(5).random
-    weights, uniform, shares, warmings = draw(7), draw(7), [*draw((2, 7)), np.ones(7)], draw((3, 7))
+    weights, uniform, shares, warmings = draw(7), draw(7), [*draw((2, 7)), np.ones(7)], list(draw((3, 7)))
     given = weights, uniform, shares, warmings
     rises = np.array([rises_of(*given, heats, 0.0) for heats in np.eye(3).tolist()])
     assert_allclose(rises, rises.T, rtol=1e-13)
-    assert_allclose(rises_of(*given, [0.0, 0.0, 0.0], 1.0), rises[2], rtol=1e-13)
+    assert_allclose(np.array(rises_of(*given, [0.0, 0.0, 0.0], 1.0)), rises[2], rtol=1e-13)
     assert_allclose(
         rises[0], [np.sum(weights * shares[0] * one * (uniform + warmings[0])) for one in shares], rtol=1e-13
     )
