@@ -43,17 +43,17 @@ ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
 def panels_of_bands(directory: Path) -> list[Panel]:
-    """Return panels of a curve's table of bands, for its first pressure and temperature."""
+    """Return panels of a curve's table of bands, for its first pressure and temperature, with the theory there."""
     curve = Results(directory, "steady")
     if "velocity" not in curve.read(outputs.BANDS):
         return []
-    whole = curve.read(outputs.BANDS).arrays((*NEEDED_OF_BANDS, "friction", "contact_area"))
-    columns = _choose(whole)
-    if not columns["velocity"].size:
+    whole = _read(curve, outputs.BANDS, (*NEEDED_OF_BANDS, "friction", "contact_area"))
+    if not whole["velocity"].size:
         return []
+    columns = _choose(whole, whole)
     theory = None
     if curve.has(outputs.BANDS_THEORY):
-        theory = _choose(curve.read(outputs.BANDS_THEORY).arrays(("velocity", "pressure", "temperature", "band")))
+        theory = _choose(_read(curve, outputs.BANDS_THEORY, NEEDED_OF_BANDS[:4]), whole)
     found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
     for one in offered("BAND_PANELS"):
         (name,) = one.columns.values()
@@ -124,14 +124,20 @@ def _describe_first(columns: dict[str, Array]) -> str:
     return ", ".join(printed.quantity(float(value), unit) for _, value, unit in several)
 
 
-def _choose(columns: dict[str, Array]) -> dict[str, Array]:
-    """Return the rows of the first pressure and temperature."""
-    if not columns["velocity"].size:
-        return columns
+def _read(curve: Results, table: str, needed: Sequence[str]) -> dict[str, Array]:
+    """Return a table of a curve; rows without a temperature have that of the job, if there is one."""
+    columns = curve.read(table).arrays(needed)
+    own = getattr(curve.job.material, "temperature", None) if curve.job else None
+    if own is not None:
+        columns["temperature"] = np.where(np.isnan(columns["temperature"]), own, columns["temperature"])
+    return columns
+
+
+def _choose(columns: dict[str, Array], whole: dict[str, Array]) -> dict[str, Array]:
+    """Return the rows at the first pressure and temperature of another table."""
     same = np.ones(columns["velocity"].size, bool)
     for name in ("pressure", "temperature"):
-        first = columns[name][0]
-        same &= np.isclose(columns[name], first, rtol=1e-6, equal_nan=True)
+        same &= np.isclose(columns[name], whole[name][0], rtol=1e-6, equal_nan=True)
     return {name: values[same] for name, values in columns.items()}
 
 
@@ -140,7 +146,8 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Pan
     found = _stacked(columns, "velocity", Axis("sliding velocity", "m/s"))
     if theory is None:
         return found
-    speeds = np.unique(theory["velocity"])
+    if not (speeds := np.unique(theory["velocity"])).size:
+        return found
     sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
     return replace(found, series=[*found.series, ENTRY, Line("", speeds, sums, THEORY_LOOK)])
 
@@ -163,12 +170,14 @@ def _over_bands(
     """Return a panel of the area over magnification, or of another column over wavelength, for some velocities."""
     longest = float(columns["long_wavelength"].max())
     x = Axis("magnification") if y is AREA else Axis("shortest wave of the band", "m")
-    shown, by, series = _some(np.unique(columns["velocity"])), {"velocity": "m/s"}, list[Line]()
+    shown, by, tables = _some(np.unique(columns["velocity"])), {"velocity": "m/s"}, list[dict[str, Array]]()
     for table in filter(None, (columns, theory)):
         kept = np.isclose(table["velocity"][:, None], shown, rtol=1e-6).any(axis=1)
         some = {column: values[kept] for column, values in table.items()}
-        some["x"] = longest / some["short_wavelength"] if y is AREA else some["short_wavelength"]
-        series += _make_lines(some, "x", name, by) if table is columns else _make_thin(some, "x", name, by, "theory")
+        tables.append(some | {"x": longest / some["short_wavelength"] if y is AREA else some["short_wavelength"]})
+    series = list(_make_lines(tables[0], "x", name, by))
+    for thin in tables[1:]:
+        series += _make_thin(thin, "x", name, by, "theory", tables[0])
     return Panel(key, x, y, series, log_x=True)
 
 
@@ -214,16 +223,16 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
             panels.append((one.key, x, name))
     theory = {}
     if x == "velocity" and COLD not in columns and curve.has(outputs.STEADY_THEORY):  # the theory has no feedback
-        theory = curve.read(outputs.STEADY_THEORY).arrays((*NEEDED, "shift_factor"))
+        theory = _read(curve, outputs.STEADY_THEORY, (*NEEDED, "temperature", "shift_factor"))
         _add_derived(theory, area)
     found = []
     for key, along, name in panels:
         series = list(_make_lines(columns, along, name, lines))
         if name == "friction" and along == x and COLD in columns:
-            series += _make_thin(columns | {name: columns[COLD]}, along, name, lines, "without feedback")
+            series += _make_thin(columns | {name: columns[COLD]}, along, name, lines, "without feedback", columns)
         if name in theory:
             alone = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
-            series += _make_thin(theory, along, name, {} if alone else lines, "theory")
+            series += _make_thin(theory, along, name, {} if alone else lines, "theory", columns)
         found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / outputs.STEADY.resolved)
@@ -247,24 +256,35 @@ def _add_derived(columns: dict[str, Array], area: float) -> None:
         columns["reduced"] = columns["shift_factor"] * columns["velocity"]
 
 
-def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -> Iterator[Line]:
-    """Yield a line for each combination of the columns `by`, given with their units."""
+def _make_lines(
+    columns: dict[str, Array], x: str, y: str, by: dict[str, str], drawn: dict[str, Array] | None = None
+) -> Iterator[Line]:
+    """Yield a line for each combination of the columns `by`, given with their units, in a table that is `drawn`, which
+    numbers the colours; by default in the same table."""
     error = columns.get(f"error_{y}")
-    places = np.array([round_digits(columns[name]) for name in by]).reshape(len(by), columns[x].size)
-    values, groups = np.unique(places, axis=1, return_inverse=True)
+    places, known = (
+        np.array([round_digits(table[name]) for name in by]).reshape(len(by), table["velocity"].size)
+        for table in (columns, columns if drawn is None else drawn)
+    )
+    values = np.unique(known, axis=1)
     for number, place in enumerate(values.T):
-        rows = np.flatnonzero(groups == number)
+        rows = np.flatnonzero((places == place[:, None]).all(axis=0))
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
         label = ", ".join(printed.quantity(value, unit) for value, unit in zip(place, by.values(), strict=True))
         look = style.line(number, values.shape[1]) | {"marker": "o"}
         yield Line(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
 
 
-def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str) -> Iterator[Line]:
-    """Yield thin lines, drawn in addition to the simulation, and their entry of the legend."""
+def _make_thin(
+    columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str, drawn: dict[str, Array]
+) -> Iterator[Line]:
+    """Yield thin lines in addition to those of the simulation, which are `drawn`, in their colours and at their places
+    only, and their entry of the legend."""
     look = {"color": style.GREY, "linestyle": THIN[label], "linewidth": THIN_LINE}
-    yield Line(label, EMPTY, EMPTY, look)
-    for line in _make_lines(columns, x, y, by):
+    lines = [line for line in _make_lines(columns, x, y, by, drawn) if line.x.size]
+    if lines:
+        yield Line(label, EMPTY, EMPTY, look)
+    for line in lines:
         yield Line("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
 
 

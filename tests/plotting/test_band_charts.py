@@ -9,6 +9,7 @@ from matplotlib.patches import Rectangle
 
 from parcontact.results import band_charts
 from parcontact.results.panels import draw
+from plotting.many import write_curve
 
 HEAD = "velocity,pressure,temperature,band,long_wavelength,short_wavelength,friction,contact_area,flash_temperature"
 
@@ -40,6 +41,25 @@ def test_bars_add_up(tmp_path: Path) -> None:
     assert area.series[0].x.tolist() == pytest.approx([10.0, 100.0])
     assert area.series[0].y.tolist() == pytest.approx([0.5, 0.25])
     assert heat.series[0].y.tolist() == [5.0, 5.0]
+
+
+@pytest.mark.parametrize(("temperature", "bars"), [(0.0, 1), (20.0, 0)])
+def test_theory_is_drawn_at_its_temperature(tmp_path: Path, temperature: float, bars: int) -> None:
+    """Theory for one temperature has the colour of that temperature, and is drawn over bars at this temperature only,
+    which are those of the first."""
+    write_curve(tmp_path, bands=2, temperatures=(0.0, 20.0))
+    for name in ("steady_theory.csv", "bands_theory.csv"):
+        head, *rows = (tmp_path / name).read_text().splitlines()
+        place = head.split(",").index("temperature")
+        kept = [row for row in rows if float(row.split(",")[place]) == temperature]
+        (tmp_path / name).write_text("".join(f"{row}\n" for row in [head, *kept]))
+    panels = {panel.key: panel for panel in band_charts.panels_of_curve(tmp_path)}
+    for key in ("steady friction", "steady area"):
+        cold, warm, entry, *theory = panels[key].series
+        assert entry.name == "theory"
+        assert [line.look["color"] for line in theory] == [(cold, warm)[temperature > 0.0].look["color"]]
+    assert sum(line is band_charts.ENTRY for line in panels["bands"].series) == bars
+    assert sum(line.name == "theory" for line in panels["bands area"].series) == bars
 
 
 def test_no_heat_no_temperatures(tmp_path: Path) -> None:
