@@ -89,6 +89,16 @@ def test_profiles_become_directions(tmp_path: Path) -> None:
     assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
 
 
+def test_oblique_waves_are_in_the_height(tmp_path: Path) -> None:
+    """Waves from 2 pi/q on have twice the mean square height of a C1D as q^-3 from q on, as C2D is C1D/(pi q) then."""
+    q = np.geomspace(1e3, 1e6, 200)
+    part = load(tmp_path, table("q[1/m] C1D[m^3]", q, 1e-3 * q**-3.0)).surface[0]
+    assert isinstance(part, jobs.RoughSpectrum)
+    found, _ = measured_maps.read_spectrum(part)
+    whole = np.trapezoid(q**2 * found(q) / (2 * np.pi), np.log(q))
+    assert whole == pytest.approx(2.0 * np.trapezoid(1e-3 * q**-2.0, np.log(q)), rel=1e-3, abs=0.0)
+
+
 def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     """Along x, with the same convention as the statistics of a road; the grid ends far above the fall of the spectrum.
 
