@@ -27,7 +27,7 @@ ROUGH = {
     **{"shape": "rough", "hurst": 0.8, "long_wavelength": LONG, "short_wavelength": SHORT, "rms_slope": 0.2},
     **{"seed": 3, "amplitudes": "fixed"},
 }
-JOB = {
+JOB: dict[str, Any] = {
     "surface": ROUGH,
     "material": {"include": "synthetic_tyre"},
     "steady": {"velocities": [0.1], "pressures": [1e6]},
