@@ -77,9 +77,9 @@ class GrowingMaps:
         hdf5.save_maps(self.path, self.slab, index, maps, marks)
 
     def replace_file(
-        self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: Sequence[int] = ()
+        self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: list[int] | None = None
     ) -> None:
-        """Create a new file of a `kind` for `count` places, whose `steps` are data too.
+        """Create a new file of a `kind` for `count` places, whose `steps` are data too; a run may have none yet.
 
         Places of the present file `found` are copied: `kept` has their new and old indices. Maps that were not saved
         are NaN.
@@ -90,7 +90,7 @@ class GrowingMaps:
             self.provenance.write(file)
             for name, unit in self.axes.items():
                 hdf5.add_coordinate(file, name, np.full(count, np.nan), unit)
-            if steps:
+            if steps is not None:
                 step = hdf5.fixed(file, "step", (count,), np.int64)
                 step[...] = steps
                 step.dims[0].attach_scale(file["t"])

@@ -96,10 +96,10 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
     if problem := checkpoint.verify(found, slab):
         return problem
     if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
-        other = "to change what follows, end the running stage at this time and add another; or"
-        raise InputError(
-            f"{path}: {difference}; {other} {ADVICE}, give --restart PATH to continue from an earlier checkpoint"
-        )
+        keys = on_root(slab.comm, lambda: tables.list_differences(tables.differences(found.job, plain, ["history"])))
+        other = f"to change what follows, end the running stage at t = {found.time:g} s and add another; or"
+        earlier = "give --restart PATH to continue from an earlier checkpoint"
+        raise InputError(f"{path}: {difference} ({keys}); {other} {ADVICE}, {earlier}")
     return found
 
 

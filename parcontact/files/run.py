@@ -314,6 +314,7 @@ def _find_origin(
     """Return the checkpoint to continue from, or None; warnings; and why there is nothing to do, or ''; collective."""
     slab, until = directory.slab, options.until
     timeline = Timeline.from_job(job, until or 0.0)
+    asked = timeline.end
     reason = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
     origin, warnings = (None, []) if reason else restart.choose_origin(job, plain, slab, directory, options.restart)
     if origin:
@@ -327,7 +328,8 @@ def _find_origin(
         )
     sanity.refuse_impossible(job, timeline)
     if origin and origin.contents.step >= len(timeline):
-        when = f"at t = {origin.contents.time:g} s"
+        beyond = "" if reached(asked, origin.contents.time) else f", beyond the end of the history at t = {asked:g} s"
+        when = f"at t = {origin.contents.time:g} s{beyond}"
         reason = f"finished before, {when} (--restart never: run it again; --until T: continue it)"
     elif origin and (end := _end_of(job, part_of("law", origin.contents.numbers))):
         reason = f"detached before, at t = {end.time:g} s (--restart never: run it again)"

@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import yaml
 from mpi4py import MPI
 from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Bench, cut, maps, part_way, rows, same
 
@@ -210,7 +211,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"numerics": {"precision": "mixed"}}, "numerics.precision was double, is mixed"),
     (
         {"history": [{**PRESS, "pressure": 2e5}, SLIDE, FASTER]},
-        "step 1 of the 6 completed ones had pressure 100000.0, but has pressure 200000.0",
+        "step 1 of the 6 completed ones had pressure 100000.0, but has pressure 200000.0 (history.0.pressure was "
+        "100000.0, is 200000.0); to change what follows, end the running stage at t = 0.00125 s",
     ),
     (
         {"history": [PRESS, {**SLIDE, "velocity": 0.3}, FASTER]},
@@ -238,6 +240,19 @@ def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: 
     assert max(of_one.count(message) for of_one in str(raised.value).split("step-")) == 1  # for each checkpoint
     assert "give --restart never to start from the beginning" in str(raised.value)
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_results_beyond_a_shorter_history(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    """Steps that are chosen go on in the last stage by --until, so a stage made shorter has results: that is said."""
+    slide = {"pressure": 1e5, "velocity": 0.2, "distance": 2e-4}
+    out = bench.where / "longer"
+    assert bench.run(bench.job("viscoelastic", history=[slide]), out) == 0
+    shorter = bench.job("viscoelastic", history=[{**slide, "distance": 1e-4}])
+    path = out.with_suffix(".yaml")
+    path.write_text(yaml.safe_dump(shorter))
+    assert main([str(path), "--out", str(out)]) == 0
+    said = "finished before, at t = 0.001 s, beyond the end of the history at t = 0.0005 s"
+    assert said in capsys.readouterr().out
 
 
 def test_other_settings(bench: Bench) -> None:

@@ -107,6 +107,17 @@ def test_goes_on_with_other_instants_and_maps(comm: MPI.Intracomm, shared_path: 
     check(path, slab, [2, 4, 6, 9, 10], 3, {"pressure": [2, 4, 6], "gap": [6]})
 
 
+def test_no_instant_is_known_yet(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """A run that chooses its steps may expect fewer than fields are due after; instants are added as it goes on."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    file = saved(path, slab, ("pressure",), [], 0)
+    check(path, slab, [], 0, {"pressure": []})
+    file.make_place([7])
+    file.save(7, 0.7, {"pressure": field(slab, 7, "pressure")})
+    file.sync(FIRST)
+    check(path, slab, [7], 1, {"pressure": [7]})
+
+
 def test_lost_or_damaged(comm: MPI.Intracomm, shared_path: Path) -> None:
     """A file that cannot be read is kept under another name; the maps of the step to go on from can still be saved."""
     path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
