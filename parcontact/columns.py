@@ -191,7 +191,11 @@ GAPS = (
         "mean of the gap u - h - d, which is 0 at points where a counterbody yields; without load, and before the "
         "first step, the surface just touches the body",
     ),
-    _measured("max_pressure", "Pa", "highest pressure"),
+    _measured(
+        *("max_pressure", "Pa"),
+        "highest pressure; with `bands` that of the highest rung of the finest band that carries load ({doc}`bands`): it "
+        "jumps where another rung does",
+    ),
 )
 CERTIFIED = (
     Column(

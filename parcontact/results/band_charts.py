@@ -36,6 +36,7 @@ SHOWN = 4  # number of velocities that are drawn as lines
 THIN_LINE = 1.0  # tuning: width of the lines of the theory [points]
 AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN_LINE}
+OVER_TIME = style.line(1)  # of the theory, as in the panels of all histories
 STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
 STEADY_ENTRY = Line("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
 SAME = 1e-9  # rounding: of distances
@@ -80,10 +81,10 @@ def panels_of_slips(run: PlottedRun) -> list[Panel]:
         own = slip, *(run.columns[name][rows] for name in ("friction", CORRECTED))
         name = stages[number].name if len(slides) > 1 else ""
         others = *_theory_of(run, starts[number], slip), *_steady_of(run, stages[number], slip)
-        for label, look, (at, *values) in ((name, style.line(count), own), *others):
+        for label, look, (at, *values) in ((name, style.line(count + (count > 0)), own), *others):
             friction.append(Line(label, at, values[0], look))
             area.append(Line(label, at, values[1], look))
-    there = ((outputs.THEORY.table, ENTRY), (outputs.STEADY.table, STEADY_ENTRY))
+    there = ((outputs.THEORY.table, replace(ENTRY, look=OVER_TIME)), (outputs.STEADY.table, STEADY_ENTRY))
     entries = [entry for name, entry in there if run.has(name)]
     bands = run.read(outputs.BANDS).arrays()
     last = bands["distance"] - starts[slides[-1]]
@@ -104,7 +105,7 @@ def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[Curve]:
         theory = run.read(outputs.THEORY.table).arrays(("distance", "friction", "contact_area"))
         there = theory["distance"] - start
         rows = (there >= slip[0]) & (there <= slip[-1])
-        yield "", THEORY_LOOK, (there[rows], theory["friction"][rows], theory["contact_area"][rows])
+        yield "", OVER_TIME, (there[rows], theory["friction"][rows], theory["contact_area"][rows])
 
 
 def _steady_of(run: PlottedRun, stage: Stage, slip: Array) -> Iterator[Curve]:
