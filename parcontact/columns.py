@@ -193,8 +193,8 @@ GAPS = (
     ),
     _measured(
         *("max_pressure", "Pa"),
-        "highest pressure; with `bands` that of the highest rung of the finest band that carries load ({doc}`bands`): it "
-        "jumps where another rung does",
+        "highest pressure; with `bands` that of the highest rung of the finest band that carries load ({doc}`bands`): "
+        "it jumps where another rung does",
     ),
 )
 CERTIFIED = (
