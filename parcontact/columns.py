@@ -364,7 +364,11 @@ CYCLES: Table = (
     Column("error_loss", "", "estimated relative error of the loss"),
     Column("friction_amplitude", "", "half the range of friction along the velocity; empty if nothing slides"),
     Column("approach_amplitude", "m", "half the range of the approach"),
-    Column("phase", "rad", "by which the displacement lags behind the force, of their first harmonics"),
+    Column(
+        "phase",
+        "rad",
+        "by which the displacement lags behind the force, of their first harmonics; empty if one is constant",
+    ),
 )
 
 BANDS_OVER_TIME: Table = (

@@ -59,7 +59,7 @@ class Cycle:
     """A row of cycles.csv, for one whole cycle of a stage.
 
     `loss` [J] has the relative error `error_loss`. Amplitudes are half the range within the cycle: of friction, NaN
-    where nothing slides, and of the approach [m]. `phase` is in rad.
+    where nothing slides, and of the approach [m]. `phase` is in rad, NaN if force or displacement is constant.
     """
 
     stage: int
@@ -106,7 +106,7 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     work = math.nan if stage.speed else _gain(cycle.get("work"))
     loss, between = _by_work(work, time, force, place) if math.isfinite(work) else _by_rows(time, force, place)
     phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
-    phase = math.remainder(phase, 2.0 * math.pi)
+    phase = math.remainder(phase, 2.0 * math.pi) if np.ptp(force) and np.ptp(place) else math.nan
     error = between / abs(loss) if loss else math.nan
     if way is None:
         error += _load_error(job, stage, cycle, phase)
@@ -219,6 +219,8 @@ def loss_with_error(loss: float, error: float) -> str:
 def _describe(job: Job, stage: Stage, cycles: Sequence[Cycle]) -> str:
     """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
     last, accuracy = cycles[-1], job.numerics.asked.of_steps
+    if math.isnan(last.phase):
+        return f"{stage.name}: loss of cycle {last.cycle} 0 J: force or displacement is constant"
     said = f"{stage.name}: loss of cycle {last.cycle} {loss_with_error(last.loss, last.error_loss)}"
     if last.error_loss > 1.0:
         return f"{said}: {'it is smaller than its error' if job.remembers else 'an elastic body loses nothing'}"

@@ -201,6 +201,17 @@ def test_what_is_said_of_the_last_two_cycles(tmp_path: Path) -> None:
     assert re.fullmatch(r"stage 1: loss of cycle 2 0 ± [0-9.]+ .?J: an elastic body loses nothing", found[0])
 
 
+def test_without_load_nothing_is_lost(tmp_path: Path) -> None:
+    """A surface that moves to and fro without a load has no force, and so neither loss nor phase."""
+    swing = {"force": 0.0, "velocity": {"amplitude": 1e-4, "frequency": FREQUENCY}, "cycles": 1}
+    job = Job.model_validate({**ball(12, swing), "interface": {"coefficient": MU, "stick": True}})
+    columns = table(marched(job)[1])
+    assert list(write_cycles(tmp_path, job, columns)) == [
+        "stage 2: loss of cycle 1 0 J: force or displacement is constant"
+    ]
+    assert math.isnan(find_cycles(job, columns)[0].phase)
+
+
 @pytest.mark.parametrize(
     ("stage", "message"),
     [
