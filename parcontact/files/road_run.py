@@ -18,9 +18,11 @@ from ..columns import BANDS_OVER_TIME, added_by, names_of, to_csv
 from ..errors import DONE, STOPPED_EARLY, InputError
 from ..job import Job, listing
 from ..job.history import reached
-from ..march.budget import SHOWN
+from ..march.budget import SHOWN, exceeds
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
+from ..results import slide
+from ..results.results import Results
 from ..streams import Bar
 from . import files, hdf5, outputs, provenance, recorder, tables
 from .directory import ADVICE, Directory
@@ -150,7 +152,11 @@ class _Run:
             self._bar.close()
         rows = hdf5.write_on_root(self.slab, self._write, f"cannot write {self.directory.path / outputs.RUN.table}")
         self.road.forget()
-        for text in sum_up_errors(rows):
+        if self.slab.root:
+            run = Results(self.directory.path, "run", self.job)
+            for text in slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, run.table):
+                self._say(text)
+        for text in sum_up_errors(rows, self.job.numerics.asked.both):
             self._say(text)
         self._say(f"done: results in {self.directory.path}")
         return DONE
@@ -191,21 +197,24 @@ class _Run:
         return rows
 
 
-def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
-    """Yield sentences on errors of friction and area of rows that slide: the mean, and the largest with its parts."""
+def sum_up_errors(rows: Sequence[StepRow], asked: tuple[float, float]) -> Iterable[str]:
+    """Yield sentences on errors of friction and area of rows that slide: the mean, which should not exceed the
+    accuracies `asked`, and the largest with its parts."""
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
     slid = rows[-1].distance > 0.0
-    for name, known in (
-        ("friction", [(row, errors.friction) for row, errors in budgets if slid and errors.friction is not None]),
-        ("contact area", [(row, errors.area) for row, errors in budgets]),
-    ):
+    frictions = [(row, errors.friction) for row, errors in budgets if slid and errors.friction is not None]
+    areas = [(row, errors.area) for row, errors in budgets]
+    for name, known, accuracy in zip(("friction", "contact area"), (frictions, areas), asked, strict=True):
         if not known:
             continue
         row, worst = max(known, key=lambda one: one[1].total)
         parts = ", ".join(f"{SHOWN[part]} {100 * value:.2g} %" for part, value in worst._asdict().items() if value)
         mean = sum(one.total for _, one in known) / len(known)
+        more = (
+            f", more than the {100 * accuracy:g} % that numerics.accuracy asks for" if exceeds(mean, accuracy) else ""
+        )
         yield (
-            f"error of {name}: {100 * mean:.2g} % on average, at most {100 * worst.total:.2g} % "
+            f"error of {name}: {100 * mean:.2g} % on average{more}, at most {100 * worst.total:.2g} % "
             f"(t = {row.time:.4g} s, slip {row.distance:.3g} m: {parts})"
         )
