@@ -138,8 +138,11 @@ class Compound:
                 )
 
     def _describe_shift(self) -> Iterator[str]:
-        """Yield comments about both factors at the lowest and the highest measured temperature."""
+        """Yield comments about both factors at the lowest and the highest measured temperature, or on the lack of a
+        shift."""
         if self.shift is None:
+            if self.measured.temperatures:
+                yield "# No shift: it takes several temperatures, or given constants, as --shift wlf:C1,C2."
             return
         how = "fitted" if self.found else "given"
         yield f"# Horizontal shift, {how}: {self.shift}."

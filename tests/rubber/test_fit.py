@@ -30,6 +30,16 @@ history: [{pressure: 1.0e4, velocity: 1.0e6, distance: 1.0e-3, cells_per_step: 1
 """
 
 
+def test_one_temperature_has_no_shift(tmp_path: Path, main: "Main") -> None:
+    """Nothing is fitted to it, and that is said; constants can be given."""
+    measured.write_sweeps(tmp_path / "one.csv", temperatures=(20.0,))
+    _, out, _ = main("fit", "one.csv", "--shift", "wlf")
+    assert "No shift: it takes several temperatures, or given constants, as --shift wlf:C1,C2." in out
+    _, out, _ = main("fit", "one.csv", "--shift", "wlf:8.86,101.6", "--reference", "20")
+    assert "Horizontal shift, given" in out
+    assert "No shift" not in out
+
+
 @pytest.mark.rendered
 def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     """The file is included by a job, the picture has a picture's size, and frequencies beyond the data are stated."""
