@@ -11,7 +11,7 @@ is at least the error, for friction (if the error by the mesh is below AGREE) an
 steps: operator calls, errors, and how often the errors of mu_dyn and mu_max are within the estimates of the run.
 
 The constants of `march.constants` that name this script are judged by the second table: PASSING and LINEAR_PASSING by
-slides, MANY_WAVES by full contact, LINEAR_PAIR and PAIR_SHARE by rests and by slides with two
+slides, MANY_WAVES by full contact, LINEAR_PAIR, EQUAL_DIFFERENCE and PAIR_SHARE by rests and by slides with two
 velocities, EULER, EULER_AREA and TIME_AREA by all. Results are on the manual's pages `method` and `accuracy`.
 """
 

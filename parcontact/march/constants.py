@@ -58,7 +58,10 @@ MANY_WAVES = Fit("steps in full contact: error of many waves over that of one", 
 PAIR_SHARE = Fit("steps in a slide: of the error that the pair shows, at least", 0.3, 1.0, MARCHES, "as PASSING")
 CURVED_RISE = Fit("quadratic step: times <L> of a change of friction", 0.5, 1.0, RISES, "0.7 to 4")
 LINEAR_PASSING = Fit("linear step: times the way over the radius of spots, and <L>", 0.66, 1.0, MARCHES, "0.8 to 1")
-LINEAR_PAIR = Fit("linear step: times a power of the difference of the pair", 5.8, 1.25, MARCHES, "as LINEAR_PASSING")
+LINEAR_PAIR = Fit("linear step: times the difference of the pair", 1.7, 1.7, MARCHES, "as LINEAR_PASSING")
+EQUAL_DIFFERENCE = Fit(
+    "linear pair at which many branches are no worse than one", 0.0072, 0.0, MARCHES, "as LINEAR_PAIR"
+)
 EULER = Fit("backward Euler: times a power of the difference of the pair", 1.1, 0.5, MARCHES, "0.8 to 1.7")
 TIME_AREA = Fit(
     "area: of the error of friction, times a power of what is open",

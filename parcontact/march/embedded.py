@@ -35,22 +35,24 @@ MISSED = 0.5  # accuracy: relative error of the load of a sample above which all
 class IntegratorDifference:
     """Result of the embedded pair for one step. All rms values are weighted by the pressure.
 
-    `difference` is relative. `slope` is the rms slope of the surface along x, in units of heights per unit of length.
-    `angle` is the rms change of the displacement in the step divided by the standard deviation of heights: in full
-    contact the angle by which a wave turns.
+    `difference` is relative, and grows with the step length to the power `order`. `slope` is the rms slope of the
+    surface along x, in units of heights per unit of length. `angle` is the rms change of the displacement in the step
+    divided by the standard deviation of heights: in full contact the angle by which a wave turns.
     """
 
     difference: float
     slope: float
+    order: float = 2.0
     angle: float = 0.0
 
 
 class _Weights(NamedTuple):
-    """Weights in e of the branch maps, of du and of du_before."""
+    """Weights in e of the branch maps, of du and of du_before, and the order of e in dt."""
 
     decay: Array
     gain: float
     back: float
+    order: float
 
 
 class EmbeddedPair:
@@ -88,7 +90,7 @@ class EmbeddedPair:
         variance = square / seen - (height / seen) ** 2
         angle = math.sqrt(turned / seen / variance) if variance > LEAST_VARIANCE * square / seen else 0.0
         difference = math.sqrt(change / size) if size > 0.0 else 0.0
-        return IntegratorDifference(difference, slope, angle)
+        return IntegratorDifference(difference, slope, weights.order, angle)
 
     def compare_without_load(
         self, dt: float, trial: Trial, memory: BodyMemory, growth: float = 0.0
@@ -97,7 +99,7 @@ class EmbeddedPair:
         is the rms difference divided by the rms displacement; collective."""
         u, weights = surface_of(memory), self._weights(dt, growth)
         _, change, size, *_ = self._add(weights, trial, memory, np.ones_like(u), u, self.stride(1.0))
-        return IntegratorDifference(math.sqrt(change / size) if size > 0.0 else 0.0, 0.0)
+        return IntegratorDifference(math.sqrt(change / size) if size > 0.0 else 0.0, 0.0, weights.order)
 
     def stride(self, share: float) -> int:
         """Return the distance between sampled rows if a `share` of the points is in contact."""
@@ -117,7 +119,7 @@ class EmbeddedPair:
         if self._kept is None or self._kept[0] != step:
             body, pair = self.material, self._pair(dt, growth)
             gain, back = float(pair.gain[body.moving].sum()), float(pair.back[body.moving].sum())
-            self._kept = step, _Weights(pair.decay[body.kept], gain, back)
+            self._kept = step, _Weights(pair.decay[body.kept], gain, back, self._order(dt, growth, gain))
         return self._kept[1]
 
     def _pair(self, dt: float, growth: float) -> Advance:
@@ -126,3 +128,11 @@ class EmbeddedPair:
         names = ("exponential", "exponential-linear") if curved else ("exponential-linear", "backward-euler")
         one, other = (coefficients(self.material.prony, name, dt, growth) for name in names)
         return Advance(one.decay - other.decay, one.gain - other.gain, one.back - other.back)
+
+    def _order(self, dt: float, growth: float, gain: float) -> float:
+        """Return the order of e in dt from the weight `gain` of du, which is proportional to dt. With the linear step
+        and backward Euler it is 2 if all branches are slow, and 1 if some are fast; with the quadratic step it is one
+        more."""
+        more = 1.0 if self.material.integrator == "exponential" and growth > 0.0 else 0.0
+        shorter = float(self._pair(0.5 * dt, growth).gain[self.material.moving].sum())
+        return 1.0 + more + math.log2(gain / shorter) if dt > 0.0 and gain > 0.0 and shorter > 0.0 else 2.0 + more

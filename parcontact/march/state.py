@@ -152,7 +152,8 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep, change: float
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
     pair, mismatch, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
     curved = scene.choices.numerics.integrator == "exponential" and step.growth > 0.0
-    of_steps: dict[str, Any] = {"difference": pair.difference, "seconds": step.dt, "change": change}
+    of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order}
+    of_steps |= {"seconds": step.dt, "change": change}
     if remembers(scene.material) and scene.material.branched is None:
         of_steps["own_error"] = scene.material.time_error(solved.body, solved.trial, step.dt)  # type: ignore[attr-defined]
     if not solved.touches:

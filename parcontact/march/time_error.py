@@ -29,8 +29,8 @@ order, PASSING x^3.
 
 The second estimate is the embedded pair (`embedded`), which shows jumps, changes of load, and creep. For a quadratic
 step it is the difference to a linear step. The pair of a linear step differs in second order if all branches are slow,
-and in first order if some are fast; the error varies as the power 1.25 of its difference. In a slide PAIR_SHARE of the
-pair counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the
+and in first order if some are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of
+the pair counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the
 difference.
 
 Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
@@ -51,6 +51,7 @@ from ..physics.measures import excess_of
 from ..physics.prony import Prony, complex_modulus
 from .constants import (
     CURVED_RISE,
+    EQUAL_DIFFERENCE,
     EULER,
     EULER_AREA,
     LINEAR_PAIR,
@@ -117,7 +118,7 @@ class StepObservation:
     `straight`: the edges follow one axis of the grid, 1, or both, 0; `friction_mismatch`: difference of friction by the
     slopes of the rigid surface and of the body; `way`: direction of sliding, (0, 0) at rest.
 
-    For steps also: `difference` of the embedded pair; `slid`: cells (of mean sides) slid in `seconds`;
+    For steps also: `difference` of the embedded pair, and its `order`; `slid`: cells (of mean sides) slid in `seconds`;
     `angle` of the pair; `curved`: the displacement is quadratic in time; `change` of friction since the step before,
     infinite after a jump; `own_error`: error of the step length that a body without branches states; `uneven`: (largest
     - mean)/mean pressure, at most 1.
@@ -135,6 +136,7 @@ class StepObservation:
     friction_mismatch: float = 0.0
     way: Vector = (0.0, 0.0)
     difference: float = 0.0
+    order: float = 2.0
     slid: float = 0.0
     seconds: float = 0.0
     angle: float = 0.0
@@ -230,7 +232,7 @@ def cell_along(run: RunProperties, way: Vector) -> float:
 
 PASSING_LOSS = 0.19  # fitted: relative error of the loss in a linear step over x (`scripts/march_errors.py`)
 SLOW = 1e-3  # rounding: z below which L is computed by its series
-LINEAR_ORDER = 1.7  # fitted: order of the error of linear steps (`scripts/march_errors.py`)
+LEAST_POWER = 0.25  # fitted: least difference of the orders of error and of a linear pair (`scripts/march_errors.py`)
 FULL_POWER = 4  # fitted: power of the area that weights the error in full contact (`scripts/march_errors.py`)
 FIXED_EDGES = 0.9  # fitted: share of the error of a linear pair that edges cause (`scripts/march_errors.py`)
 
@@ -257,11 +259,14 @@ def time_error(run: RunProperties, observed: StepObservation) -> float:
 
 
 def _error_by_pair(observed: StepObservation) -> float:
-    """Return the error that the embedded pair shows; at most 1 for linear steps."""
+    """Return the error by the embedded pair. For linear steps it has the order LINEAR_PAIR.order, the difference
+    `order`."""
     if observed.curved:
         return observed.difference
+    power = max(LEAST_POWER, LINEAR_PAIR.order / max(observed.order, 1.0) - 1.0)
     fixed = 1.0 - FIXED_EDGES * observed.area**2
-    return min(1.0, fixed * LINEAR_PAIR.value * observed.difference**LINEAR_PAIR.order)
+    more = (observed.difference / EQUAL_DIFFERENCE.value) ** power
+    return min(1.0, fixed * LINEAR_PAIR.value * observed.difference * more)
 
 
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
@@ -292,7 +297,7 @@ def order_of_time_error(integrator: str, curved: bool) -> float:
     """Return the power of the step length with which the time error grows; `curved`: u is quadratic in time."""
     if integrator == "backward-euler":
         return 1.0
-    return PASSING.order if integrator == "exponential" and curved else LINEAR_ORDER
+    return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order
 
 
 def _share_passed(run: RunProperties, observed: StepObservation) -> float:

@@ -133,7 +133,7 @@ def test_nothing_pressed_and_jumps() -> None:
 
 def test_second_order_of_a_step() -> None:
     """Smooth motion: half the step, a quarter of the difference to backward Euler, an eighth of that between quadratic
-    and linear steps."""
+    and linear steps; the order of what du weighs, to z = dt/tau of the fastest branch."""
     slab = Slab.alone(4, 1)
     found, curved = [], []
     for count in (64, 128):
@@ -148,6 +148,22 @@ def test_second_order_of_a_step() -> None:
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
     bends = np.sin(3.0 * (1.0 - 1.0 / 64)) / np.sin(3.0 * (1.0 - 1.0 / 128))  # second differences are of a step before
     assert curved[0].difference / curved[1].difference == pytest.approx(8.0 * bends, rel=0.01)
+    assert curved[1].order == pytest.approx(3.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("times", "dt", "order"),
+    [([1.0], 1e-6, 2.0), (np.logspace(-9.0, 9.0, 73).tolist(), 1e-3, 1.0), ([1.0], 0.0, 2.0), ([], 1e-3, 2.0)],
+)
+def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: float) -> None:
+    """Two where the branch is slow, to z = dt/tau; one where there are as many branches of every time, to the share of
+    those beyond the ends. A jump, and a body of no branch, have none: two is returned."""
+    slab, prony = Slab.alone(4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
+    body = HeldBody(ZenerBody(slab, prony, "exponential"))
+    trial = body.begin(dt, MovedHeights(slab.zeros()))
+    body.commit(trial, np.ones((1, 4)))
+    look = EmbeddedPair(slab, body.body, DX).compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
+    assert look.order == pytest.approx(order, rel=1e-5)
 
 
 @pytest.mark.mpi
