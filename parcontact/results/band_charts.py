@@ -88,7 +88,7 @@ def panels_of_slips(run: PlottedRun) -> list[Panel]:
     entries = [entry for name, entry in there if run.has(name)]
     bands = run.read(outputs.BANDS).arrays()
     last = bands["distance"] - starts[slides[-1]]
-    kept = (last > 0.0) & (last <= ways[slides[-1]] + SAME * bands["distance"])
+    kept = (last > SAME * bands["distance"]) & (last <= ways[slides[-1]] + SAME * bands["distance"])
     return [
         Panel("bands slip", x, Axis("friction coefficient"), [*friction, *entries], log_x=True),
         Panel("bands slip area", x, Axis(FRACTION), [*area, *entries], log_x=True),

@@ -18,7 +18,7 @@ from parcontact.effects.heat.solver import Flash
 from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
 from parcontact.job.meaning import excited_band
 from parcontact.parallel.slab import Slab
-from parcontact.results import report_sections
+from parcontact.results import band_charts, report_sections
 
 LONG = 4e-3
 MEASURED = {
@@ -154,3 +154,22 @@ def test_plan_says_bands_and_contacts(tmp_path: Path) -> None:
     assert int(said[1]) == 4  # two velocities at two temperatures
     assert int(said[2]) == 4 * (14 + 1)  # one rung under the mean pressure alone, 14 below
     assert re.fullmatch(r"on 1 rank: [0-9.e+]+ s or more in all", lines[-1])
+
+
+def test_the_start_of_a_slide_is_no_slip(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Distances are sums, so that the slip of the first row may be a rounding error: it has no place on a logarithm."""
+    stages = [SimpleNamespace(seconds=seconds, speed=0.1, slides=True, name="") for seconds in (1.0, 2.0, 1.0)]
+    distance = np.array([0.1 * 1.0 + 0.1 * 2.0 + 1e-16, 0.31, 0.4])  # a sum of floats is not 0.3
+    table = {"distance": distance, "band": np.zeros(3)}
+    run = SimpleNamespace(
+        job=SimpleNamespace(history=stages),
+        rows_of_stages=[[], [], [1, 2]],
+        columns={"distance": distance, "friction": distance, "contact_area_corrected": distance},
+        has=lambda name: False,
+        read=lambda name: type("Table", (), {"__contains__": lambda *_: True, "arrays": lambda *_: table})(),
+    )
+    seen: list[Any] = []
+    monkeypatch.setattr(band_charts, "_stacked", lambda columns, *_: seen.append(columns["slip"]))
+    monkeypatch.setattr(band_charts, "_steady_of", lambda *_: ())
+    band_charts.panels_of_slips(run)  # type: ignore[arg-type]
+    assert seen[0] == pytest.approx([0.01, 0.1])
