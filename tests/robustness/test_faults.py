@@ -93,8 +93,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def children(process: subprocess.Popen[str]) -> list[int]:
-    """The ranks that an mpirun has started, by the launcher that it has started."""
-    return outside.ranks_of(process.pid)
+    """The two ranks that an mpirun has started, by the launcher that it has started. The system may leave out some
+    while others start or end, so it is asked again."""
+    deadline = time.monotonic() + SECONDS
+    while len(found := outside.ranks_of(process.pid)) < 2 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.005)
+    return found
 
 
 def steps(out: Path) -> int:
