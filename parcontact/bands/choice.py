@@ -25,8 +25,8 @@ from ..errors import InputError
 from ..job import Grid, Job, Topography, map_files, measured_maps
 from ..job.advice import fast_length
 from ..job.calculation import AUTO, LEAST_CELLS, Bands
+from ..job.limits import doubt_memory
 from ..job.listing import answers
-from ..job.machine import doubt_memory
 from ..job.measured_maps import prepare
 from ..march import map_sentences
 from ..march.measured_range import doubt_band

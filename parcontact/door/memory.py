@@ -34,8 +34,8 @@ from ..errors import InputError, RunError
 from ..files import wisdom
 from ..job import Job
 from ..job.history import MadeStep, Timeline
+from ..job.limits import machines
 from ..job.listing import plain_data
-from ..job.machine import machines
 from ..march import scene, steady
 from ..march.choices import choices
 from ..march.controller import tolerance_before

@@ -14,7 +14,7 @@ meshes each, for the area 24 states on about 40 meshes, with references of 160 c
 count as 12. `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is
 hypot(x dx, y dy) long. Without sliding both axes count as along the sliding direction.
 
-Warnings about physics are in `meaning.py`, about memory in `machine.py`.
+Warnings about physics are in `meaning.py`, about memory in `limits.py`.
 """
 
 from __future__ import annotations

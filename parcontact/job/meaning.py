@@ -16,7 +16,6 @@ from ..rubber.shift import doubt_kelvin
 from . import limits
 from .advice import Sections, doubts_of_resolution
 from .calculation import Grid
-from .machine import doubt_needs
 from .materials import Elastic, PronyBranch, Zener
 from .stages import Stage, Swing
 from .surfaces import (
@@ -482,5 +481,5 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_outside, _room, neighbours, doubt_needs),
+    *(_outside, _room, neighbours, limits.doubt_needs),
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..doubts import Doubt, Kind
 from ..errors import InputError, JobError, RunError
-from ..job import Job, OnOneMesh, Output, advice, machine, meaning
+from ..job import Job, OnOneMesh, Output, advice, limits, meaning
 from ..job.advice import more_points
 from ..job.history import Timeline
 from ..job.limits import MOST_STEPS
@@ -60,7 +60,7 @@ def _beyond_file(count: int, output: Output) -> str:
 
 def refuse_memory(job: Job) -> None:
     """Raise InputError for a grid that cannot fit into the memory of the machines."""
-    for doubt in machine.doubt_memory(job.grid):
+    for doubt in limits.doubt_memory(job.grid):
         raise InputError(str(doubt))
 
 

@@ -13,7 +13,7 @@ from judged_scenes import RUBBER, SPHERE, Json, job_of, of_file, rough_heights, 
 from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
-from parcontact.job import Job, JobError, load, machine
+from parcontact.job import Job, JobError, limits, load
 from parcontact.job.advice import cells_for_area
 from parcontact.job.history import Timeline
 from parcontact.march import sanity, scene
@@ -74,8 +74,8 @@ PRESS = {"pressure": 1e4}
     ids=str,
 )
 def test_absurd_jobs_are_stated(job: Job, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "_memory", lambda: 64e9)
-    monkeypatch.setattr(machine, "_free", lambda directory: 100e9)
+    monkeypatch.setattr(limits, "_memory", lambda: 64e9)
+    monkeypatch.setattr(limits, "_free", lambda directory: 100e9)
     found = [warning for warning in job.warnings if all(word in warning for word in words)]
     assert len(found) == 1, job.warnings
 
@@ -262,7 +262,7 @@ def test_strict_refuses_before_anything_is_written(tmp_path: Path, run_parcontac
 
 def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """With or without strict: there would be a MemoryError later."""
-    monkeypatch.setattr(machine, "_memory", lambda: 64e9)
+    monkeypatch.setattr(limits, "_memory", lambda: 64e9)
     large = job_of(WAVE, [PRESS], grid={"points": 200_000, "size": 1e-3})
     with pytest.raises(InputError, match=r"need at least 2\.88e\+03 GB of memory"):
         sanity.refuse_impossible(large, Timeline.from_job(large))
