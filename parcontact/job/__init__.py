@@ -4,8 +4,7 @@ from ..errors import JobError
 from .calculation import Checkpoint, Grid, Numerics, Output, Study
 from .materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe_job
-from .parts import Part
-from .quantities import Positive, log_range
+from .parts import Part, Positive, log_range
 from .reading import Case, load, load_cases, select_cases
 from .stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady, Swing
 from .surfaces import (

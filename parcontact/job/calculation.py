@@ -19,21 +19,26 @@ from ..capabilities import stated
 from ..errors import InputError
 from ..rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical
 from ..rubber.shift import Shift as Law
-from .parts import Instead, Origin, Part, Rule, chosen, rules_of
-from .quantities import (
+from .parts import (
     AUTO_POINTS,
     FROM_SURFACE,
     Count,
     Flag,
     Fraction,
+    Instead,
     NonNegative,
     Number,
+    Origin,
+    Part,
     Positive,
     Real,
+    Rule,
     Whole,
     both,
+    chosen,
     from_home,
     listed,
+    rules_of,
 )
 from .yaml_text import Fault, did_you_mean, quote, refuse
 

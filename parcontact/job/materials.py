@@ -14,8 +14,7 @@ from ..errors import InputError
 from ..rubber import compound
 from ..rubber.shift import log_vertical
 from .calculation import Celsius, Shift, shifted
-from .parts import Instead, Part, Rule, chosen, existing_file, rules_of
-from .quantities import NonNegative, Number, Positive
+from .parts import Instead, NonNegative, Number, Part, Positive, Rule, chosen, existing_file, rules_of
 from .yaml_text import Fault, quote, refuse
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import capabilities
-from .quantities import log_range
+from .parts import Included, log_range
 from .yaml_text import UNREADABLE, Key, Place, Source, parse, quote, read_source, read_with_content, shorten, source_of
 
 SWEEP: Key = ("sweep",)
@@ -130,17 +130,6 @@ def refuse_overrides(sweep: Sweep, overrides: list[Setting], source: Source) -> 
 
 
 OURS = Path(__file__).parents[1] / "materials"  # compounds that come with the program
-
-
-class Included(NamedTuple):
-    """An included file: its absolute path, and the SHA-256 of its content."""
-
-    path: Path
-    sha256: str
-    section: str = "material"
-
-    def __str__(self) -> str:
-        return f"{self.section}: included from {self.path} (SHA-256 {self.sha256})"
 
 
 class Reading(NamedTuple):

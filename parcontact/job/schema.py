@@ -23,8 +23,20 @@ from . import listing
 from .materials import Dma, Elastic, Zener
 from .model import Job, extended_model
 from .overrides import materials
-from .parts import Part, kind_key, literal_words
-from .quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
+from .parts import (
+    AUTO_POINTS,
+    FROM_SURFACE,
+    LARGEST,
+    MOST,
+    Part,
+    along_x,
+    both,
+    bounded,
+    countable,
+    kind_key,
+    listed,
+    literal_words,
+)
 from .stages import Stage, expand_range
 from .yaml_text import list_words
 

@@ -23,8 +23,21 @@ from pydantic import (
 
 from .. import capabilities
 from .calculation import Celsius
-from .parts import Instead, Origin, Part, Rule, rules_of
-from .quantities import Count, Flag, Positive, Real, Vector, along_x, listed, log_range
+from .parts import (
+    Count,
+    Flag,
+    Instead,
+    Origin,
+    Part,
+    Positive,
+    Real,
+    Rule,
+    Vector,
+    along_x,
+    listed,
+    log_range,
+    rules_of,
+)
 from .yaml_text import Fault, quote, refuse
 
 FREQUENCY: Any = (Positive, Field(description="a positive frequency [Hz]"))

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo, WithJsonSchema
 
 from .calculation import Grid
-from .parts import Part, Rule, chosen, existing_file
-from .quantities import LARGEST, SMALLEST, Flag, Number, Positive, Real, Seed, Whole, both
+from .parts import LARGEST, SMALLEST, Flag, Number, Part, Positive, Real, Rule, Seed, Whole, both, chosen, existing_file
 from .yaml_text import Fault, is_array, quote, refuse
 
 if TYPE_CHECKING:

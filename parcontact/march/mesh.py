@@ -36,8 +36,7 @@ from ..job.calculation import Accuracy, Grid, Numerics
 from ..job.listing import plain_data
 from ..job.materials import AnyMaterial, Material
 from ..job.model import prepared
-from ..job.parts import Origin, Part
-from ..job.quantities import AUTO_POINTS, FROM_SURFACE
+from ..job.parts import AUTO_POINTS, FROM_SURFACE, Origin, Part
 from ..job.stages import Initial, Stage, Steady
 from ..job.surfaces import OnOneMesh, Rough, RoughSpectrum, Shape, Spectral, Topography, Wave
 from ..job.yaml_text import UNREADABLE, Source, is_array

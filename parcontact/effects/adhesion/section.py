@@ -18,8 +18,7 @@ from ...doubts import Doubt, Kind
 from ...job import meaning
 from ...job.advice import more_points
 from ...job.calculation import Grid
-from ...job.parts import Part
-from ...job.quantities import Positive
+from ...job.parts import Part, Positive
 from ...job.surfaces import Sphere
 from .law import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
 

@@ -16,8 +16,7 @@ from ...errors import InputError, RunError
 from ...job import Grid, limits
 from ...job.history import Timeline
 from ...job.listing import effects_of
-from ...job.parts import Part, Rule, rules_of
-from ...job.quantities import Positive
+from ...job.parts import Part, Positive, Rule, rules_of
 from ...job.yaml_text import Fault
 from ...parallel import fft
 from ...parallel.fft import Spectrum

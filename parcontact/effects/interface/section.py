@@ -10,8 +10,7 @@ from pydantic import Field
 from ... import capabilities
 from ...doubts import Doubt, Kind
 from ...job import limits
-from ...job.parts import Part, Rule, rules_of
-from ...job.quantities import Flag, Positive
+from ...job.parts import Flag, Part, Positive, Rule, rules_of
 from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
 from ...physics.entries import Memory

@@ -12,8 +12,7 @@ from pydantic import Field
 from ...doubts import Doubt, Kind
 from ...job import limits
 from ...job.advice import more_points
-from ...job.parts import Part, rules_of
-from ...job.quantities import Positive
+from ...job.parts import Part, Positive, rules_of
 from ...job.stages import Stage
 from ...job.surfaces import Flat, Rough, Sphere, Wave, wave_numbers
 from ...job.yaml_text import Fault

@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ...job import limits
-from ...job.parts import Part, Rule, rules_of
-from ...job.quantities import Count, NonNegative, Positive
+from ...job.parts import Count, NonNegative, Part, Positive, Rule, rules_of
 from ...job.stages import Ramp, Stage
 from ...job.yaml_text import Fault, quote, refuse
 from .flow import FLUIDS, Fluid, PressureDrop

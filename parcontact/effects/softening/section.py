@@ -10,8 +10,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, PrivateAttr
 
 from ...errors import InputError
-from ...job.parts import Part, Rule, existing_file, rules_of
-from ...job.quantities import Positive
+from ...job.parts import Part, Positive, Rule, existing_file, rules_of
 from ...job.yaml_text import Fault, refuse
 from .strain_table import StrainTable, read_sweep
 
