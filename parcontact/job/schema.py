@@ -22,7 +22,6 @@ from pydantic_core.core_schema import (
 from . import listing
 from .materials import Dma, Elastic, Zener
 from .model import Job, extended_model
-from .overrides import materials
 from .parts import (
     AUTO_POINTS,
     FROM_SURFACE,
@@ -37,6 +36,7 @@ from .parts import (
     listed,
     literal_words,
 )
+from .reading import materials
 from .stages import Stage, expand_range
 from .yaml_text import list_words
 

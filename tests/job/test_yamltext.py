@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from parcontact.job import JobError, load, yaml_text
-from parcontact.job.overrides import read_job
+from parcontact.job.reading import read_job
 
 from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
 
