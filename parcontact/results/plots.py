@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..files import hdf5, outputs
 from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
-from . import band_charts, histories, maps, style, theory_table
+from . import band_charts, maps, plotted_run, style, theory_table
 from .panels import Axis, Line, Panel, offered, picture
 from .plotted_run import PlottedRun
 from .results import Results, read_cases, swept_keys
@@ -121,8 +121,8 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     if has_run:
         run = PlottedRun(directory)
         found = run.job.title or directory.absolute().name
-        titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
-        groups.append(options.choose(histories.panels_of_run(run, options.over)))
+        titles.append(found if run.curves else f"{found}\n{plotted_run.describe_solve(run)}")
+        groups.append(options.choose(plotted_run.panels_of_run(run, options.over)))
         if not options.panels:
             groups.append(band_charts.panels_of_slips(run))
     elif options.at:
@@ -181,7 +181,7 @@ def _compare(directories: Sequence[Path], found: Sequence[list[Panel]], least: i
 def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
     found: list[Panel] = []
     if (directory / outputs.RUN.table).is_file():
-        found += options.choose(histories.panels_of_run(PlottedRun(directory), options.over))
+        found += options.choose(plotted_run.panels_of_run(PlottedRun(directory), options.over))
     if (directory / outputs.STEADY.table).is_file() and options.wants("steady"):
         found += band_charts.panels_of_curve(directory, options.over)
     return found

@@ -1,21 +1,31 @@
-"""Results of a run, for pictures and reports: rows, stages, and saved maps."""
+"""The results of a run for pictures and reports: its rows, stages, saved maps and panels.
 
+Panels show measures of the run against time, distance, velocity, load or approach.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import printed
+from ..columns import UNITS
 from ..errors import InputError
 from ..files import outputs
 from ..files.fields import SavedMaps
 from ..files.hdf5 import MEND
 from ..job import Job
 from ..job.history import Timeline
+from ..job.listing import answers
 from ..job.reading import shown_job
 from ..parallel.slab import Array
-from .panels import Axis
+from . import style
+from .cycles import friction_along, way_along
+from .panels import Axis, ColumnPanel, Line, Panel, Shade, offered
 from .results import Results
 
 FRACTION = "contact area /\nnominal area"
@@ -191,3 +201,204 @@ def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
 def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
     """Return axis and values of the contact: its area for a free box of this `area` [m^2], else its nominal share."""
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)
+
+
+EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
+FEW_ROWS = 8
+STAGE_WHITE = 0.87  # share of white in the shade of a stage
+LENGTHS = (
+    ColumnPanel("approach", Axis("approach", UNITS["approach"]), {"": "approach"}),
+    ColumnPanel("gap", Axis("mean gap", UNITS["mean_gap"]), {"": "mean_gap"}),
+    ColumnPanel("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": "max_pressure"}),
+)
+ENERGIES = {
+    "work done": "work",
+    "dissipated": "dissipated",
+    "stored": "stored",
+    "surfaces": "surface_energy",
+    "snaps": "snap_loss",
+    "slip": "slip_loss",
+}
+ENERGY = ColumnPanel("energy", Axis("energy", UNITS["work"]), ENERGIES)
+VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an interface
+
+
+@dataclass(frozen=True)
+class Abscissa:
+    """The horizontal axis of a run's panels: SI `values` of all or some `rows`, `shades` of stages, and whether rows
+    are `marked`. `loop` is True if values return, as loads and approaches do."""
+
+    axis: Axis
+    values: Array
+    rows: NDArray[np.intp] | None = None
+    shades: Sequence[Shade] = ()
+    marked: bool = False
+    loop: bool = False
+
+    def series(self, lines: dict[str, Array]) -> list[Line]:
+        """Return lines for the given arrays, with their names; a single line gets no name."""
+        mark = {"marker": "o"} if self.marked else {}
+        looks = [style.line(number) | mark for number in range(len(lines))]
+        rows = slice(None) if self.rows is None else self.rows
+        drawn = zip(lines.items(), looks, strict=True)
+        return [Line(name, self.values, values[rows], look) for (name, values), look in drawn]
+
+
+def panels_of_run(run: PlottedRun, over: str = "") -> list[Panel]:
+    """Return panels of the measures of a run; none for a single solve. Raises InputError if nothing can be drawn."""
+    if not run.curves:
+        return []
+    along = _choose_abscissa(run, over)
+    log = along.axis.unit == "s" and _steps_grow(along.values)
+    found = [replace(panel, shades=along.shades, log_x=log) for panel in _find_panels(run, along)]
+    if along.marked or along.loop:
+        return found
+    first, *others = (_add_theory(panel, run) for panel in found)
+    return [first, *_panels_of_cycles(run), *others]
+
+
+def _panels_of_cycles(run: PlottedRun) -> list[Panel]:
+    """Return the loops of oscillations, or friction over displacement of a surface that sticks and is moved to and fro
+    along x."""
+    if any(stage.frequency for stage in run.job.history):
+        return list(_panels_of_loops(run))
+    if not (run.backwards and "stick_area" in run.columns):
+        return []
+    ways = np.diff(run.columns["distance"], prepend=0.0)
+    for number, rows in run.rows_of_stages.items():
+        ways[rows] *= np.sign(run.job.history[number].velocity[0])
+    line = Line("", np.cumsum(ways), run.columns["friction_x"], style.line(0))
+    return [Panel("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
+
+
+def _panels_of_loops(run: PlottedRun) -> Iterator[Panel]:
+    """Yield panels of load over approach, and of friction over displacement, with a line for each stage that
+    oscillates."""
+    loads, frictions = list[Line](), list[Line]()
+    load_axis, load = run.load
+    starts = np.cumsum([0.0, *(stage.seconds for stage in run.job.history)]).tolist()
+    for number, rows in run.rows_of_stages.items():
+        stage = run.job.history[number]
+        rows = [*range(max(rows[0] - 1, 0), rows[0]), *rows]
+        columns = {name: values[rows] for name, values in run.columns.items()}
+        lines = frictions if stage.speed and not stage.slides else loads
+        look, name = style.line(len(lines)), stage.name
+        if stage.frequency and lines is loads:
+            loads.append(Line(name, columns["approach"], load[rows], look))
+        elif stage.frequency and (way := way_along(stage, columns, starts[number])) is not None:
+            friction = friction_along(stage, columns) / (run.area * columns["pressure"])
+            frictions.append(Line(name, way, friction, look))
+    if loads:
+        yield Panel("loop", Axis("approach", "m"), load_axis, _named_if_many(loads), bottom=False)
+    if frictions:
+        axes = Axis("displacement along the velocity", "m"), Axis("friction coefficient\nalong the velocity")
+        yield Panel("loop", *axes, _named_if_many(frictions))
+
+
+def _named_if_many(lines: list[Line]) -> list[Line]:
+    """Return lines, without a name if there is one only."""
+    return lines if len(lines) > 1 else [replace(line, name="") for line in lines]
+
+
+def _steps_grow(times: Array) -> bool:
+    """Return True if most rows are so early that only a logarithmic axis separates them."""
+    later = times[times > 0.0]
+    return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
+
+
+def _add_theory(panel: Panel, run: PlottedRun) -> Panel:
+    """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
+    column = {"friction": "friction", "area": "contact_area"}.get(panel.key)
+    if column is None or run.backwards or not run.has(outputs.THEORY.table):
+        return panel
+    theory = run.read(outputs.THEORY.table).arrays()
+    over = "distance" if panel.x.unit == "m" else "time"
+    (own,) = panel.series
+    lines = [replace(own, name="simulation"), Line("theory", theory[over], theory[column], style.line(1))]
+    if panel.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
+        lines.append(Line("without interface", own.x, run.columns[VISCOUS], style.line(2)))
+    return replace(panel, series=lines)
+
+
+def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
+    """Yield the panels of a run that show anything, those of columns first."""
+    signed = run.backwards and not along.marked  # the axis of speed has no direction
+    columns = dict(run.columns)
+    (load_axis, columns["load"]), (area_axis, columns["area"]) = run.load, run.in_contact
+    columns["approach"] = np.where(columns["load"] != 0.0, columns["approach"], np.nan)
+    friction = Axis("friction coefficient" + "\nalong x" * signed), {"": "friction_x" if signed else "friction"}
+    first = ColumnPanel("friction", *friction), ColumnPanel("area", area_axis, {"": "area"})
+    load = ColumnPanel("load", load_axis, {"": "load"})
+    shown = _shown(run, along, load_axis, columns)
+    for one in (*first, *LENGTHS, load, ENERGY, *offered("RUN_PANELS")):
+        lines = {name: columns[column] for name, column in one.columns.items() if column in columns}
+        if lines and shown.get(one.key, True):
+            found = Panel(one.key, along.axis, one.y, along.series(lines), bottom=one.key != "approach")
+            peak = one.key == "friction"
+            yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
+    for panels_of in answers("pictures", "panels"):
+        yield from panels_of(run, along)
+
+
+def _shown(run: PlottedRun, along: Abscissa, load_axis: Axis, columns: Mapping[str, Array]) -> dict[str, bool]:
+    """Return whether the panels that not all runs have show anything."""
+    load = columns["load"]
+    return {
+        "friction": run.slides and bool(columns["friction"].any()),  # friction is 0 without a load
+        "approach": run.free and along.axis.name != "approach",
+        "gap": not run.free and columns["area"].min() < 1.0,
+        "load": run.lasts and along.axis != load_axis and bool(np.ptp(load) > 1e-9 * np.abs(load).max()),
+        "energy": run.lasts and bool(np.isfinite(columns["work"]).all()),
+    }
+
+
+def describe_solve(run: PlottedRun) -> str:
+    """Return the results of the last solve as text."""
+    axis, load = run.load
+    fraction = run.columns["contact_area_corrected"][-1]
+    area = printed.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
+    name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
+    length = printed.quantity(run.columns[column][-1], "m", 4)
+    highest = printed.quantity(run.columns["max_pressure"][-1], "Pa", 4)
+    pressed = f"{axis.name} {printed.quantity(load[-1], axis.unit, 4)}"
+    return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
+
+
+def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
+    """Return the given axis, else distance if the surface slides whenever time passes, else time, else load."""
+    if not over:
+        slides = run.slides and all(stage.slides for stage in run.job.history if stage.seconds)
+        over = ("distance" if slides else "time") if run.lasts else "load"
+    if over == "load":
+        return Abscissa(*run.load, marked=True)
+    if over == "velocity":
+        return _choose_velocity(run)
+    axis, values = Axis("distance slid" if over == "distance" else over, UNITS[over]), run.columns[over]
+    if not np.ptp(values):
+        constant = f"{over}, which is constant at {values[-1]:g} {axis.unit}"
+        raise InputError(f"{run.path}: nothing can be drawn over {constant}")
+    if over == "approach":
+        return Abscissa(axis, values, loop=True)
+    stages = [
+        (run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]]))
+        for number, rows in run.rows_of_stages.items()
+    ]
+    return Abscissa(axis, values, shades=_shade([stage for stage in stages if stage[1] < stage[2]]))
+
+
+def _shade(stages: Sequence[tuple[str, float, float]]) -> list[Shade]:
+    """Return the shades of several stages with their starts and ends, each name in its colour."""
+    names = list(dict.fromkeys(name for name, _, _ in stages))
+    colors = dict(zip(names, style.sequence(len(names)), strict=True))
+    shades = [Shade(*stage, color=style.mix(colors[stage[0]], STAGE_WHITE)) for stage in stages]
+    return shades if len(stages) > 1 else []
+
+
+def _choose_velocity(run: PlottedRun) -> Abscissa:
+    """Return the axis of speed, with the last row of each sliding stage."""
+    ends = [(run.job.history[number].speed, rows[-1]) for number, rows in run.rows_of_stages.items()]
+    sliding = sorted((speed, row) for speed, row in ends if speed > 0.0)
+    if not sliding:
+        raise InputError(f"{run.path}: nothing can be drawn over velocity, no stage slides")
+    speeds, rows = zip(*sliding, strict=True)
+    return Abscissa(Axis("sliding velocity", "m/s"), np.array(speeds), np.array(rows), marked=True)

@@ -28,7 +28,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
-from . import band_charts, histories, info, maps, slide, style, surface_summary, theory_table
+from . import band_charts, info, maps, plotted_run, slide, style, surface_summary, theory_table
 from .curve_tables import (
     RC,
     Browser,
@@ -78,7 +78,7 @@ def describe_run(directory: Path) -> ReportSection:
         *theory_table.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_table.describe_settings(directory),
     ]
-    found = histories.panels_of_run(run)
+    found = plotted_run.panels_of_run(run)
     unnamed = [replace(one, shades=[replace(shade, name="") for shade in one.shades]) for one in found[1:]]
     pictures = [*map(draw_panel, [*found[:1], *unnamed]), *_more_pictures(directory)]
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))

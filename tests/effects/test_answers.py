@@ -11,7 +11,7 @@ import yaml
 from conftest import WORLD, Main
 
 from parcontact import capabilities
-from parcontact.results import histories
+from parcontact.results import plotted_run
 from parcontact.results.plotted_run import PlottedRun
 
 from .tread_wear import forget, install, shown
@@ -56,7 +56,7 @@ def test_sentences_headlines_and_panels(main: Main, job: Path) -> None:
     assert re.search(r"^  the tread is worn by \S+ m$", said, re.MULTILINE)
     assert main("report", "out")[0] == 0
     assert "the tread is worn; " in (job.parent / "out" / "report.html").read_text()
-    assert "wear" in [chart.key for chart in histories.panels_of_run(PlottedRun(job.parent / "out"))]
+    assert "wear" in [chart.key for chart in plotted_run.panels_of_run(PlottedRun(job.parent / "out"))]
     assert main("plot", "out", "--panels", "wear")[0] == 0
 
 

@@ -13,9 +13,8 @@ import numpy as np
 from ...columns import UNITS
 from ...parallel.slab import Array
 from ...results import style
-from ...results.histories import Abscissa
 from ...results.panels import Axis, Colors, ColumnPanel, Line, Panel, picture
-from ...results.plotted_run import PlottedRun
+from ...results.plotted_run import Abscissa, PlottedRun
 from .flow import FloatMap, Flow
 
 CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
