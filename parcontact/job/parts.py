@@ -284,6 +284,7 @@ FROM_SURFACE = "from surface"  # grid.points or grid.size: as the measured map
 AUTO_POINTS = "auto"  # grid.points: chosen by the accuracy
 MOST = 2**31 - 1  # largest whole number: transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-60, 1e60  # rounding: range of numbers in a job, whose squares and quotients do not overflow
+LOWEST, HIGHEST = -273.15, 5000.0  # physics: range of temperatures [deg C]
 LONGEST_NUMBER = 400  # tuning: longest text of a number [characters]
 LONGEST_NAME = 4096  # longest path, PATH_MAX of Linux [characters]
 
@@ -375,6 +376,7 @@ Real = Annotated[float, Field(strict=True, allow_inf_nan=False), NUMBER, BOUNDED
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False), NUMBER, BOUNDED]
 NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NUMBER, BOUNDED]
 Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
+Celsius = Annotated[Real, Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000")]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(countable)]
 Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(countable)]
 Seed = Annotated[

@@ -22,8 +22,8 @@ from pydantic import (
 )
 
 from .. import capabilities
-from .calculation import Celsius
 from .parts import (
+    Celsius,
     Count,
     Flag,
     Instead,
