@@ -92,7 +92,7 @@ def unit_of_path(path: str) -> str:
 @cache
 def _units() -> dict[str, set[str]]:
     """Return the units of all keys by their names."""
-    capabilities.offers("section", "__name__")  # imports all sections
+    capabilities.offers("effect", "__name__")  # imports all sections
     found, kinds = dict[str, set[str]](), [Part]
     for kind in kinds:
         kinds += kind.__subclasses__()

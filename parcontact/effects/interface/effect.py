@@ -1,4 +1,4 @@
-"""The effect of interface friction: a shear stress on the area in contact (`physics.motion`)."""
+"""The `interface` section of a job, friction of the contact area itself (`physics.motion`), and its effects."""
 
 from __future__ import annotations
 
@@ -6,11 +6,170 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
+from pydantic import Field
+
+from ... import capabilities
 from ...columns import added_by
+from ...doubts import Doubt, Kind
+from ...job import limits
+from ...job.parts import Flag, Part, Positive, Rule, rules_of
+from ...job.surfaces import Rough, RoughSpectrum, Topography
+from ...job.yaml_text import Fault
+from ...physics.entries import Memory
 from ...physics.measures import Measures
 from ...physics.motion import InterfaceFriction
-from ..effect import Changes, Instant
-from .section import Interface, InterfaceEffect
+from ..effect import Changes, Decision, Effect, Instant
+from ..relaxation import time_factor_of
+
+SAME = 1e-9  # rounding: tolerance on Poisson's ratio
+LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal
+
+
+def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
+    if (velocity is None) != (width is None):
+        missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
+        yield Fault(f"is missing; a bell over the velocity needs it in addition to {given}", (missing,))
+
+
+def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
+    if coefficient is not None and not stick:
+        yield Fault("needs stick: true", ("coefficient",))
+    if coefficient is not None and velocity is not None:
+        yield Fault("cannot be used with coefficient: a bell over the velocity needs shear_stress", ("velocity",))
+
+
+def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
+    if interface is None:
+        return
+    if interface.stick and abs(material.poisson - 0.5) > SAME:
+        yield Fault(
+            f"needs material.poisson of 0.5, got {material.poisson:g}: pressure on a compressible body moves its "
+            "surface sideways, too, which is not solved for",
+            ("interface", "stick"),
+        )
+    elif material.poisson < LEAST_POISSON:
+        yield Fault(
+            f"needs material.poisson of at least {LEAST_POISSON:g}, got {material.poisson:g}: shear on a compressible "
+            "body moves its surface, which is not solved for (see parcontact manual limits)",
+            ("interface",),
+        )
+
+
+def _sticks(interface: Any, grid: Any, initial: Any, steady: Any) -> Iterator[Fault]:
+    """Refuse what stick is not solved for."""
+    if interface is None or not interface.stick:
+        return
+    if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
+        yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", ("interface", "stick"))
+    for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+        if asked:
+            yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
+
+
+def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
+    """Refuse rolling without stick, of a rough surface, and in chosen steps."""
+    if interface is None or not interface.stick:
+        yield from limits.no_rolling(history)
+        return
+    rough = any(isinstance(shape, Rough | RoughSpectrum | Topography) for shape in surface)
+    for index, stage in enumerate(history):
+        place = ("history", index, "creep")
+        if stage is not None and stage.rolls and rough:
+            yield Fault("needs a smooth surface: heights travel with the contact, those of a rough wheel do not", place)
+        if stage is not None and stage.rolls and stage.chooses:
+            yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the error of rolling", place)
+
+
+def _in_bands(interface: Any, bands: Any, history: Any) -> Iterator[Fault]:
+    if interface is not None and interface.stick and bands is not None and history:
+        sentence = "cannot be used with bands and a history: tractions of all bands would have to be solved together"
+        yield Fault(sentence, ("interface", "stick"))
+
+
+def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
+    if interface is not None and interface.stick and adhesion is not None:
+        yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
+
+
+OF_TRACTIONS = [check for name, check in limits.no_field.items() if name == "traction"]  # none without `effects.stick`
+
+
+def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:
+    if interface is None or not interface.stick:
+        yield from (fault for check in OF_TRACTIONS for fault in check(output))
+
+
+def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]:
+    """Refuse keys of `effects.stick` in a program without this folder."""
+    asked = {"stick": stick, "coefficient": coefficient is not None}
+    for key in (key for key, given in asked.items() if given and not capabilities.has("stick")):
+        yield Fault("is not a key of interface; known keys: shear_stress, velocity, width", (key,), at_key=True)
+
+
+class Interface(Part):
+    """The `interface` section: friction by a shear stress, constant or a bell curve of the logarithm of the velocity,
+    or by a coefficient; with `stick: true` points stick until the traction reaches this bound."""
+
+    label: ClassVar[str] = "interface"
+    shear_stress: Positive | None = Field(
+        default=None, description="a positive shear stress on the area in contact [Pa]"
+    )
+    coefficient: Positive | None = Field(default=None, description="a positive coefficient of friction [-]")
+    velocity: Positive | None = Field(default=None, description="a positive velocity [m/s], where the bell is highest")
+    width: Positive | None = Field(default=None, description="a positive number of decades, the width of the bell [-]")
+    stick: Flag = False
+
+    one_of = (("shear_stress", "coefficient"),)
+    rules = rules_of(_needs_its_folder, _whole_bell, _coefficient)
+
+    def friction(self, material: Any) -> InterfaceFriction | None:
+        """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
+        if self.shear_stress is None:
+            return None
+        return InterfaceFriction(self.shear_stress, self.velocity, self.width or 1.0, time_factor_of(material))
+
+
+WARN_WHOLE_BOX_STICKS = Kind(
+    "whole box sticks",
+    "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
+    "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights",
+)
+
+
+class InterfaceEffect(Effect[Memory]):
+    """Base class of the two effects of the `interface` section."""
+
+    section: ClassVar[type[Part]] = Interface
+    in_curves: ClassVar[bool] = True
+    in_bands_over_time: ClassVar[bool] = True
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(
+        _incompressible, _sticks, _rolls, _in_bands, _no_adhesion, _has_tractions
+    )
+    lifts: ClassVar[tuple[Any, ...]] = (*OF_TRACTIONS, limits.no_rolling)
+
+    @staticmethod
+    def remembers(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
+    def sheared_first(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
+    def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
+        """Yield a warning about full contact of a periodic box in which points may stick."""
+        if job.section("interface").stick and all(job.grid.cyclic) and measures.contact_area == 1.0:
+            yield WARN_WHOLE_BOX_STICKS("", {"where": where})
+
+    @staticmethod
+    def decide(job: Any) -> Decision:
+        law: Interface | None = job.section("interface")
+        if law is None:
+            return Decision("interface", False, "there is no interface section")
+        bound = f"a coefficient of {law.coefficient or 0.0:g}"
+        if law.shear_stress is not None:
+            bound = f"a shear stress of {law.shear_stress:g} Pa at most"
+        return Decision("interface", True, bound + ", below which points stick" * law.stick)
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
@@ -29,12 +188,11 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
 
     def __new__(cls, scene: Any) -> Any:
-        """Return the effect of a job: with `stick` that of tractions (`effects.stick.effect`)."""
+        """Return the effect of a job: with `stick` that of tractions (in `effects.stick`)."""
         if not scene.job.section("interface").stick:
             return super().__new__(cls)
-        from ..stick.effect import StickSlip
-
-        return StickSlip(scene)
+        (tractions,) = capabilities.offers("effect", "StickSlip")
+        return tractions(scene)
 
     @staticmethod
     def shear(job: Any) -> InterfaceFriction | None:

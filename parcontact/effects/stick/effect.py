@@ -58,7 +58,7 @@ from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import Measures
 from ...physics.motion import Vector
 from ..effect import Changes, Instant, Sheared
-from ..interface.section import InterfaceEffect
+from ..interface.effect import InterfaceEffect
 from . import solver
 from .solver import ShearOperator, TangentialSolver, TractionProblem, components, settle_slips, stacked
 
