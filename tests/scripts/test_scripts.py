@@ -54,7 +54,7 @@ SMALL = {
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_faults.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "march_errors": Small(["--marches", "1"], r"(?m)^exponential +0.01 +[0-9.]+ "),
-    "mutants": Small(["--count", "1", "--seed", "1", "effects/counterbody/section.py"], r"(?m)^1 of 1 seen"),
+    "mutants": Small(["--count", "1", "--seed", "1", "effects/counterbody/effect.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),

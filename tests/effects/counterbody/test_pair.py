@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parcontact.effects.counterbody.section import pair
+from parcontact.effects.counterbody.effect import pair
 from parcontact.physics.prony import Prony, complex_modulus
 
 FREQUENCIES = np.logspace(-9, 9, 200)  # [rad/s], beyond the twelve decades of relaxation times on both sides
