@@ -12,7 +12,6 @@ Effects are imported only for jobs that have their sections.
 
 from __future__ import annotations
 
-import re
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -26,7 +25,7 @@ from typing import Any
 from .. import capabilities
 from ..errors import InputError, RunError
 from .calculation import Numerics
-from .parts import Part
+from .parts import Part, unit_in
 from .stages import Oscillation, Ramp, Swing
 from .surfaces import HeightArray
 from .yaml_text import Fault, refuse
@@ -79,8 +78,7 @@ def plain_job(job: Any) -> dict[str, Any]:
 
 def unit(kind: type[Part], key: str) -> str:
     """Return the unit of a key, from the brackets in its description; '' if it has none."""
-    found = re.search(r"\[([^\],]+)\]", kind.model_fields[key].description or "")
-    return found.group(1) if found and found.group(1) != "-" else ""
+    return unit_in(kind.model_fields[key].description).removeprefix("-")
 
 
 def unit_of_path(path: str) -> str:

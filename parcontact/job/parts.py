@@ -191,7 +191,8 @@ class Part(BaseModel):
         if _absent(error):
             return Fault(f"is missing; it {expected}", path)
         got = quote(filled[name] if kind == "missing" else value)
-        return Fault(f"{expected}, got {got}{did_you_mean(value, words)}{in_si(value)}", path)
+        advice = did_you_mean(value, words) or in_si(value, unit_in(field.description))
+        return Fault(f"{expected}, got {got}{advice}", path)
 
     @classmethod
     def _instead(cls, word: str) -> Instead:
@@ -334,6 +335,12 @@ def from_home(path: Path) -> Path:
         return path.expanduser()
     except RuntimeError:
         refuse(Fault(f"must be the name of a file, got {str(path)!r}: there is no such user"))
+
+
+def unit_in(description: str | None) -> str:
+    """Return the unit in the brackets of a key's description, `-` if it has no dimension, '' without brackets."""
+    found = re.search(r"\[([^\],]+)\]", description or "")
+    return found[1] if found else ""
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:

@@ -119,7 +119,7 @@ def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, P
     settings: list[Setting] = []
     if any(name == fixed or name.startswith(f"{fixed}.") for fixed in FIXED):
         source.note(key_place, f"{shorten(name)} cannot be swept")
-    elif other := next((one for one in seen if _overlap(one, name)), ""):
+    elif other := next((one for one in seen if _overlap(source.data, one, name)), ""):
         source.note(key_place, f"{shorten(name)} is swept a second time, first as {shorten(other)} at {seen[other]}")
     elif not all(name.split(".")):
         source.note(key_place, f"must be a key of the job like grid.points, got {quote(name)}")
@@ -137,16 +137,23 @@ def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, P
     return settings
 
 
-def _overlap(one: str, other: str) -> bool:
-    """Return True if one key is equal to the other or within it."""
-    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
+def _path_in(data: dict[str, Any], name: str) -> Key:
+    """Return the path of a key in the data of a job, where `surface.0` also names a surface that is one mapping."""
+    path = tuple(name.split("."))
+    return ("surface", *path[2:]) if path[:2] == ("surface", "0") and isinstance(data.get("surface"), dict) else path
+
+
+def _overlap(data: dict[str, Any], one: str, other: str) -> bool:
+    """Return True if one key of the data of a job is equal to the other or within it."""
+    outer, inner = sorted((_path_in(data, one), _path_in(data, other)), key=len)
+    return inner[: len(outer)] == outer
 
 
 def refuse_overrides(sweep: Sweep, overrides: list[Setting], source: Source) -> None:
     """Note a mistake for each override of a key that is swept."""
     names = {setting.name for axis in sweep.axes for setting in axis[0]}
     for override in overrides:
-        if found := next((swept for swept in names if _overlap(swept, override.name)), ""):
+        if found := next((swept for swept in names if _overlap(source.data, swept, override.name)), ""):
             advice = f"change the sweep instead, like --set 'sweep=[{{{shorten(found)}: [...]}}]'"
             source.note(override.place, f"{shorten(found)} is swept; {advice}")
 
@@ -214,21 +221,18 @@ def _parse(change: Change, source: Source) -> Setting | None:
 def _apply(source: Source, override: Setting) -> None:
     """Set the value at the path of an override, and create missing mappings on the path.
 
-    `surface.0` also names a surface that is a single mapping. `auto` is replaced by a mapping of the keys that
-    overrides set.
+    `auto` is replaced by a mapping of the keys that overrides set.
     """
     if not isinstance(source.data, dict):
         return
     node: Any = source.data
-    found, given = Key(), override.path
-    if given[:2] == ("surface", "0") and isinstance(node.get("surface"), dict):
-        given = ("surface", *given[2:])
+    found, given = Key(), _path_in(node, override.name)
     for index, name in enumerate(given):
-        if isinstance(node, list) and str(name).isdecimal() and int(name) < len(node):
+        if isinstance(node, list) and str(name) in map(str, range(len(node))):
             name = int(name)
         elif not isinstance(node, dict):
             if node is not UNREADABLE:
-                source.note(override.key_place, _dead_end(node, ".".join(map(str, found)), str(name)))
+                source.note(override.key_place, _dead_end(node, ".".join(map(str, found)), shorten(str(name))))
             return
         found = (*found, name)
         if index == len(given) - 1:

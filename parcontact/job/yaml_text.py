@@ -117,7 +117,7 @@ BOUNDED = reprlib.Repr()  # a `repr` of limited length
 BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
 BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500
 PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
-UNITS = {f"{prefix}{unit}": size for prefix, size in PREFIXES.items() for unit in ("m", "s", "Pa", "N", "m/s")}
+HAVE_PREFIXES = ("m", "s", "Pa", "N", "Hz", "m/s")
 AT_VALUE, AT_KEY = "at value", "at key"  # types of this module's errors in pydantic
 
 
@@ -177,15 +177,15 @@ def closest(word: Any, words: Iterable[str]) -> str:
     return known[close[0]] if close else ""
 
 
-def in_si(value: Any) -> str:
-    """Return the ending '; write 1.0e-3' if a value is a number with a unit, such as '1 mm', else ''."""
-    found = (
-        re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S+)", value.strip()) if isinstance(value, str) else None
-    )
-    if not found or (unit := UNITS.get(found[2])) is None:
+def in_si(value: Any, unit: str) -> str:
+    """Return the ending '; write 1.0e-3' if a value is a number in a multiple of its `unit`, such as '1 mm', else
+    ''."""
+    text = value.strip() if isinstance(value, str) and unit in HAVE_PREFIXES else ""
+    found = re.fullmatch(rf"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*({'|'.join(PREFIXES)}){unit}", text)
+    if not found:
         return ""
     try:
-        digits, exponent = f"{float(found[1]) * unit:.9e}".split("e")
+        digits, exponent = f"{float(found[1]) * PREFIXES[found[2]]:.9e}".split("e")
     except ValueError:
         return ""
     return f"; write {float(digits)}e{int(exponent)}"

@@ -147,6 +147,12 @@ def test_mistakes_in_overrides(override: str, sentence: str) -> None:
     assert mistakes_of(SMALL, override) == [f"--set {override}: {sentence}"]
 
 
+def test_an_index_with_more_digits_than_python_reads_is_a_mistake() -> None:
+    (mistake,) = mistakes_of(SMALL, f"history.{'9' * 5000}.pressure=1")
+    assert "history is a list with one entry, history.0, and has no 999" in mistake
+    assert len(mistake) < 1000
+
+
 def test_overrides_of_a_file_that_cannot_be_read() -> None:
     assert mistakes_of("a: [", "a.b=1", "c") == [
         (
@@ -332,6 +338,10 @@ def test_one_case(path: Path) -> None:
             "  - {grid: [{points: 8, size: 1}], grid.points: [16]}",
             "job.yaml:7:36: grid.points is swept a second time, first as grid at job.yaml:7:6",
         ),
+        (
+            "  - {surface.phase: [0, 1], surface.0.phase: [2, 3]}",
+            "job.yaml:7:29: surface.0.phase is swept a second time, first as surface.phase at job.yaml:7:6",
+        ),
         ("  - {grid.points: 1:2000:1001}", "job.yaml:7:3: sweep has 1001 cases; at most 1000 are allowed"),
     ],
 )
@@ -355,3 +365,5 @@ def test_a_mistake_of_some_cases_names_the_first_of_them(path: Path) -> None:
 def test_an_override_of_what_is_swept_is_a_mistake(path: Path) -> None:
     (found,) = sweep_mistakes(path, TIMES, "history.0.pressure=1")
     assert found.startswith("--set history.0.pressure=1: history.0.pressure is swept; change the sweep instead")
+    (found,) = sweep_mistakes(path, "  - {surface.phase: [0, 1]}\n", "surface.0.phase=2")
+    assert found.startswith("--set surface.0.phase=2: surface.phase is swept")

@@ -30,6 +30,7 @@ GRID = {
     "grid: {points: 64, size: [1, 0]}": "1:30: grid.size.1 must be a positive length [m], got 0",
     "grid: {points: 64, size: .inf}": "1:26: grid.size must be a positive length [m], got inf",
     "grid: {points: 64, size: 1 mm}": "1:26: grid.size must be a positive length [m], got '1 mm'; write 1.0e-3",
+    "grid: {points: 64, size: 1 Pa}": "1:26: grid.size must be a positive length [m], got '1 Pa'",
     "grid: {points: 64, size: true}": "1:26: grid.size must be a positive length [m], got true",
     "grid: {points: 64, size: [1, 1, 1]}": "1:26: grid.size must be a positive length [m], got [1, 1, 1]",
     "grid: {points: 0, size: 1}": "1:16: grid.points must be a positive whole number of points, got 0",
@@ -227,6 +228,7 @@ OTHERS = {
         "mesh, with a list study.mesh"
     ),
     "output: {branch_dissipation: true}": "5:30: output.branch_dissipation needs energy: true",
+    "checkpoint: {minutes: 10 s}": "5:23: checkpoint.minutes must be a positive wall time in minutes [min], got '10 s'",
     "checkpoint: {every: 1, minutes: 1}": (
         "5:13: checkpoint takes at most one of every | minutes, got every and minutes"
     ),
