@@ -23,7 +23,7 @@ from ..parallel.slab import Slab
 from ..physics.body import states_errors
 from ..physics.entries import Saved, part_of
 from ..printed import quantity
-from ..results import cycles, slide
+from ..results import slide
 from ..results.results import Results
 from . import checkpoint, hdf5, outputs, provenance, recorder, restart, tables, wisdom
 from .checkpoint import Contents, Facts
@@ -233,7 +233,7 @@ class Run:
             return
         try:
             rows = tables.read_columns(self.directory.path / outputs.RUN.table)
-            for text in cycles.write_cycles(self.directory.path, self.job, rows):
+            for text in slide.write_cycles(self.directory.path, self.job, rows):
                 self.console.say(text)
         except (OSError, InputError) as error:
             self.console.warn(f"cycles.csv cannot be written: {error}")

@@ -27,7 +27,7 @@ from ..job.listing import answers
 from ..job.reading import CASES
 from ..parallel.slab import Slab
 from ..printed import quantity, with_error
-from . import cycles, slide, theory_table
+from . import slide, theory_table
 from .results import PLACES, Results, describe_end, read_cases, swept_keys
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
@@ -171,7 +171,7 @@ def describe_run_in_words(run: Results) -> Iterator[str]:
     """Yield sentences on the slide and the cycles of a run, and sentences of its effects."""
     if (job := run.job) is not None:
         yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
-        yield from cycles.describe_cycles(job, run.table)
+        yield from slide.describe_cycles(job, run.table)
     for sentences in answers("results", "sentences"):
         yield from sentences(run)
 
@@ -309,8 +309,8 @@ def _headline_of_run(directory: Path) -> str:
     parts = [f"{text}{_describe_conditions(run)}" for text in _friction(job, columns)]
     for headline in answers("results", "headline"):
         parts += headline(run)
-    if last := cycles.measure_last(job, columns):
-        parts.append(f"the last cycle loses {cycles.loss_with_error(last['loss'], last['error_loss'])}")
+    if last := slide.measure_last(job, columns):
+        parts.append(f"the last cycle loses {slide.loss_with_error(last['loss'], last['error_loss'])}")
     return _to_sentence([*parts, _area(job, run)])
 
 

@@ -24,9 +24,9 @@ from ..job.listing import answers
 from ..job.reading import shown_job
 from ..parallel.slab import Array
 from . import style
-from .cycles import friction_along, way_along
 from .panels import Axis, ColumnPanel, Line, Panel, Shade, offered
 from .results import Results
+from .slide import friction_along, way_along
 
 FRACTION = "contact area /\nnominal area"
 MEASURED = (

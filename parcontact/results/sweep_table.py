@@ -102,9 +102,7 @@ def _results(case: Case) -> dict[str, Any]:
             run = Results(directory, "run", case.job)
             row |= dict(pair for swept in answers("results", "swept") for pair in swept(run))
             if any(stage.frequency for stage in case.job.history):
-                from . import cycles
-
-                row |= cycles.measure_last(case.job, columns)
+                row |= slide.measure_last(case.job, columns)
             asked = [name for key, names in SECTIONS.items() if _asks_for(case, key) for name in names]
             row |= {name: _last(columns[name]) for name in asked if name in columns}
             row["seconds"] = math.fsum(columns["seconds"])

@@ -19,7 +19,7 @@ from scipy.special import jv
 from parcontact.files.recorder import StepRow
 from parcontact.job import Job
 from parcontact.job.history import Timeline
-from parcontact.results.cycles import Cycle, find_cycles, write_cycles
+from parcontact.results.slide import Cycle, find_cycles, write_cycles
 
 MODULUS, BRANCH, TIME = 1e6, 2e6, 1e-2  # long-term, of the branch [Pa], relaxation time [s]
 RUBBER = {"model": "zener", "modulus_inf": MODULUS, "branches": [{"modulus": BRANCH, "relaxation_time": TIME}]}
