@@ -62,7 +62,7 @@ STANDS_ON = {  # modules that stand on another floor than their room
     ),
     **_on("verbs", "door.arguments", "door.map_jobs", "door.verbs"),
     **_on("physics", "effects.leakage.flow", "effects.heat.solver"),
-    **_on("contact", "effects.stick.solver", "effects.adhesion.gap_solver", "effects.adhesion.law"),
+    **_on("contact", "effects.stick.solver", "effects.adhesion.gap_solver"),
     **_on("report", "effects.leakage.over_time"),
 }
 

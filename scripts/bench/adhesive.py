@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from parcontact.contact.problem import Approach
-from parcontact.effects.adhesion.gap_solver import GapOperators, GapSolution, GapSolver
-from parcontact.effects.adhesion.law import EXPONENTIAL, Law
+from parcontact.effects.adhesion.gap_solver import EXPONENTIAL, GapOperators, GapSolution, GapSolver, Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace

@@ -135,7 +135,7 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("called without an adhesion section")
 
     places = ["effects.adhesion.gap_solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
-    places += ["effects.adhesion.adhesive_law.advance_energies"]
+    places += ["effects.adhesion.effect.advance_energies"]
     places += [
         f"effects.adhesion.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")
     ]

@@ -1,18 +1,18 @@
-"""Contact law with adhesion, whose unknown is the gap, and energies of contacts with adhesion.
+"""Contact law with adhesion, whose unknown is the gap, for periodic and free bodies.
 
 Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
 last two gaps, extrapolated in time and moved with the surface by whole cells.
 
-Energies are the work of the load, the energy of the surfaces, and losses in snaps.
+`AdhesiveSolver` extends the solver, which needs the inverse of its operator, to a free body. The FFT does not invert
+the operator A of a free body. The operator B of a periodic body, with the same Green's function up to half the box,
+replaces it (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A - B)
+p` with the p of the pass before. One or two passes are usual.
 
-In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
-F_t ds`. The difference between the gain and this work is lost in a snap if the load could not have supplied it on any
-path between the two states. Otherwise the difference is an error of the rule, and the work is set to the gain.
-
-Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
-load on this path depends on inertia, which the model does not have. From the last equilibrium on, the work is taken as
-the least that the change needs, and as 0 if energy is released; this energy is lost. While surfaces are detached,
-neither work nor losses change.
+A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
+state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
+detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations (`FreeInverse`).
+Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the inverse of A on
+pressures of mean 0.
 """
 
 from __future__ import annotations
@@ -23,51 +23,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...contact.problem import Approach, Contact, Control, MeanPressure
+from ...contact.problem import Approach, Contact, Control, MeanPressure, Operator, Workspace
 from ...job.history import Step
-from ...march.constants import ENERGY
 from ...parallel import regrid
-from ...parallel.slab import Array
+from ...parallel.slab import Array, Slab
 from ...physics import loops
 from ...physics.body import Trial
 from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import SIDE, Certificate, Measures
 from ...physics.motion import cells_between
-from ..effect import (
-    Detached,
-    EdgeMotion,
-    End,
-    Instant,
-    PreviousContacts,
-    SolvedContact,
-    end_in,
-    entries_of_end,
-    nothing_holds,
-)
-from . import law as gap_kernels
-from .gap_solver import AdhesiveSolver, GapOperators, GapSolver
-from .law import DUGDALE, EXPONENTIAL, Law, cell_of, modulus_of
-from .section import adhesion_law
-
-LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
-FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
-SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"  # names of numbers of the law
-
-
-class AdhesiveEnergies(NamedTuple):
-    """Energies [J] since the start of a run with adhesion.
-
-    `work` of the rigid surface; energy of the `surfaces`, 0 at large gaps; energy `lost` in snaps; `error`, the sum
-    over all steps without a snap of the difference between work and energies.
-    """
-
-    work: float = 0.0
-    surfaces: float = 0.0
-    lost: float = 0.0
-    error: float = 0.0
-
-
-NO_ENERGIES = AdhesiveEnergies()
+from ..effect import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, end_in, entries_of_end, nothing_holds
+from .gap_solver import DUGDALE, EXPONENTIAL, SHARPER, GapOperators, GapSolution, GapSolver, Law, surface_energy
+from .section import adhesion_law, cell_of, modulus_of
 
 
 class PathWork:
@@ -87,33 +54,196 @@ class PathWork:
         self.approach, self.pressure = contact.d, pressure
 
 
-def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
-    """Return the energies after a step, in a box with an `area` [m^2]."""
-    numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
-    surfaces = numbers[SURFACES]
-    gained = instant.gained + surfaces - past.surfaces
-    dragged, doubt = _drag(before, measures, instant.moved)
-    work = numbers[PUSHED] + dragged
-    if numbers[JUMPS]:
-        work = max(work, gained)
-    else:
-        way = measures.approach - before.approach
-        doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
-    lost = work - gained
-    snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
-    error = past.error + ENERGY.value * instant.error_area * abs(instant.dissipated)
-    if snaps:
-        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, error)
-    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, error + abs(lost))
+MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
 
-def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
-    """Return the work of sliding by `moved` without friction of the interface, and its error [J]."""
-    (x, y), slid = moved, math.hypot(*moved)
-    if not slid:
-        return 0.0, 0.0
-    works = [-(one.force_x * x + one.force_y * y) - one.force_interface * slid for one in (before, now)]
-    return 0.5 * sum(works), 0.5 * abs(works[1] - works[0]) + FORCE_DOUBT * abs(works[1])
+@dataclass(frozen=True)
+class FreeInverse:
+    """Inverse of the operator `free` of a free body, by conjugate gradients with the inverse for a `repeated` body,
+    which has the same Green's function up to half the box: a dozen steps give five digits. The energy of the error is
+    below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate results.
+
+    If `means` is False, pressures have the mean 0, and mean displacements are ignored.
+    """
+
+    slab: Slab
+    free: Operator
+    repeated: GapOperators
+    tolerance: float
+    maps: tuple[Array, Array, Array, Array]
+    means: bool
+
+    def apply(self, field: Array, out: Array) -> Array:
+        """Put the pressure that causes the displacement `field` into `out`; collective."""
+        r, z, t, image = self.maps
+        r[...] = field
+        t[...] = self._precondition(r, z)
+        size = self._product(r, z)
+        goal = self.tolerance**2 * size
+        out.fill(0.0)
+        for _ in range(MAX_STEPS):
+            if not size > goal:
+                break
+            self.free.apply(t, image)
+            step, before = size / self._product(t, image), size
+            out += np.multiply(t, step, out=z)
+            r -= np.multiply(image, step, out=z)
+            size = self._product(r, self._precondition(r, z))
+            t *= size / before
+            t += z
+        return out
+
+    def _precondition(self, r: Array, z: Array) -> Array:
+        self.repeated.inverse.apply(r, z)
+        if self.means:
+            z += self.slab.sum(float(r.sum()))[0] / self.slab.points / self.repeated.least_mean
+        return z
+
+    def _product(self, a: Array, b: Array) -> float:
+        return self.slab.sum(float(np.vdot(a, b)))[0]
+
+
+MAX_PASSES = 12  # tuning: limit on passes of a free body before A itself is used; one to three are usual
+LEFT = 0.8  # accuracy: tolerance of a solve with A over the tolerance of the run; the rest is for the inverse
+DIGITS = 0.01  # accuracy: relative error of the inverse of A, over the tolerance
+UNSETTLED = "did not settle in a free box"
+LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of the lagged part that is made
+
+
+@dataclass
+class AdhesiveSolver:
+    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic body."""
+
+    gaps: GapSolver
+    workspace: Workspace
+    tolerance: float
+    free: Operator | None = None
+
+    def solve(
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array | None,
+        out: Array,
+        loose: float = 1.0,
+    ) -> tuple[Contact, bool]:
+        """Solve from the map `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
+
+        `free_correction` is `(A - B) p` of a free body and is updated. `loose` multiplies the tolerance. Return the
+        contact, and True if the surfaces have detached.
+        """
+        tolerance = loose * self.tolerance
+        if self.free is None or free_correction is None:
+            found = self.gaps.solve(law, heights, control, gap, tolerance)
+            out[...] = found.p
+            u = self.workspace.displacement
+            np.add(gap, heights, out=u)
+            u += found.d
+            return self._contact(found, out, found.iterations), found.detached
+        start = self.workspace.pressure
+        start[...] = gap
+        found, iterations = self._solve_fixed_point(law, heights, control, gap, free_correction, out, tolerance)
+        if found.failure:
+            gap[...] = start
+            found = self._solve_free(law, heights, control, gap, free_correction, out, tolerance)
+            iterations += found.iterations
+        return self._contact(found, out, iterations), found.detached
+
+    def _solve_fixed_point(
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array,
+        out: Array,
+        tolerance: float,
+    ) -> tuple[GapSolution, int]:
+        """Repeat the solve of a free body until `free_correction` is constant. Return the solution, with a failure if
+        it does not settle, and the iterations of all passes; collective."""
+        iterations, share, last = 0, 1.0, free_correction
+        for passes in range(1, MAX_PASSES + 1):
+            found = self.gaps.solve(law, heights - free_correction, control, gap, tolerance)
+            iterations += found.iterations
+            found, change, worst = self._compare(heights, control, gap, found, out)
+            share = self._share(share, out, change, last) if passes > 1 else 1.0
+            last = change
+            free_correction += share * change
+            if found.failure or worst <= tolerance or (found.detached and passes == 1):
+                return found, iterations
+            if passes > 1 and (found.jumped or found.detached):
+                break
+        return replace(found, failure=UNSETTLED), iterations
+
+    def _solve_free(
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array,
+        out: Array,
+        tolerance: float,
+    ) -> GapSolution:
+        """Solve with the operator of the free body and update `free_correction`; collective."""
+        assert self.free is not None
+        work, repeated = self.workspace, self.gaps.operators
+        maps = (work.pressure, work.displacement, work.other_displacement, free_correction)  # all in double precision
+        inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
+        operators = repeated._replace(operator=self.free, inverse=inverse)
+        if isinstance(control, Approach):
+            operators = operators._replace(mean=math.inf, least_mean=math.inf)
+            found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
+            found = replace(found, d=control.value)
+        else:
+            work.displacement.fill(1.0)
+            lifted = heights - control.value * self.free.apply(work.displacement, work.displacement)
+            found = self.gaps.solve(law, lifted, control, gap, LEFT * tolerance, operators)
+        found, _, worst = self._compare(heights, control, gap, found, out)
+        repeated.operator.apply(out, free_correction)
+        np.subtract(work.displacement, free_correction, out=free_correction)
+        if not found.failure and worst > tolerance:
+            asked = f"changes are {worst:.3g} where {tolerance:.3g} was asked for"
+            return replace(found, failure=f"{UNSETTLED}: {asked}")
+        return found
+
+    def _compare(
+        self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
+    ) -> tuple[GapSolution, Array, float]:
+        """Put the pressure into `out`; collective. Return the solution with its error on the free body in the
+        certificate, the displacement of the free body minus that of the solution, and the size of this difference."""
+        assert self.free is not None
+        out[...] = found.p
+        change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
+        change -= found.d
+        found, worst = self._judge(control, found, out, change)
+        return found, change, worst
+
+    def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
+        """Add the change of displacements in a pass to the certificate, except a change of the approach. Return the
+        solution and this error; collective."""
+        certificate, slab, weight = found.certificate, self.workspace.slab, np.abs(p)
+        load, sum_change = slab.sum(float(weight.sum()), float(np.vdot(weight, change)))
+        shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
+        (wrong,) = slab.sum(float(np.vdot(weight, np.abs(change - shift))))
+        worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0
+        certificate = replace(certificate, complementarity=max(certificate.complementarity, worst))
+        return replace(found, certificate=certificate, d=found.d + shift), worst
+
+    def _share(self, share: float, p: Array, change: Array, last: Array) -> float:
+        """Return the share of a change to make: Aitken's extrapolation of the last two, weighted by the pressure;
+        collective."""
+        weight, difference = np.abs(p), change - last
+        along = float((weight * last * difference).sum())
+        along, size = self.workspace.slab.sum(along, float((weight * difference**2).sum()))
+        wanted = -share * along / size if size > 0.0 else 1.0
+        return min(max(wanted, LEAST_SHARE), MOST_SHARE)
+
+    def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
+        """Return the solution as a contact, whose displacement is in the workspace."""
+        return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)
 
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
@@ -230,10 +360,10 @@ class AdhesiveLaw:
             remark = "" if separate else nothing_holds(step.control, step.load)
         numbers = self._tension(law, contact.p, trial.alpha) | {"points_changed": changed}
         if self.scene.energy is not None:
-            sum_gamma = 0.0 if walk.detached else self.slab.sum(gap_kernels.surface_energy(law, gap))[0]
-            numbers[SURFACES] = sum_gamma * trial.alpha * self.scene.energy.unit
-            numbers[PUSHED] = walk.work * trial.alpha
-            numbers[JUMPS] = float(walk.detached or path.closes_gap_first)
+            sum_gamma = 0.0 if walk.detached else self.slab.sum(surface_energy(law, gap))[0]
+            numbers["surface_energy"] = sum_gamma * trial.alpha * self.scene.energy.unit
+            numbers["work_of_load"] = walk.work * trial.alpha
+            numbers["leaves_equilibrium"] = float(walk.detached or path.closes_gap_first)
         touching = law.touches(now.pasts[0].gap)
         pull = numbers["adhesive_force"]
         least_load = self._least_load(law, trial.alpha, control, contact.p, pull)
@@ -355,7 +485,8 @@ class AdhesiveLaw:
 
     def _tension(self, law: Law, p: Array, alpha: float) -> dict[str, float]:
         """Return the share of points under tension and the force of all tension [N]; collective."""
-        count, pull = self.slab.sum(*gap_kernels.tension(p, LEAST_TENSION * law.strength))
+        tense = float(np.count_nonzero(p < -LEAST_TENSION * law.strength))
+        count, pull = self.slab.sum(tense, float(np.maximum(-p, 0.0).sum()))
         unit = alpha * self.scene.units.pressure * self.grid.lx * self.grid.ly / self.slab.points
         return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
 

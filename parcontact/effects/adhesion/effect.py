@@ -1,11 +1,23 @@
-"""The effect of adhesion: the columns, rules and warnings of the section `adhesion`."""
+"""The effect of adhesion: columns, rules and warnings of the section `adhesion`, and energies of adhesive contacts.
+
+Energies are the work of the load, the energy of the surfaces, and losses in snaps.
+
+In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
+F_t ds`. The difference between the gain and this work is lost in a snap if the load could not have supplied it on any
+path between the two states. Otherwise the difference is an error of the rule, and the work is set to the gain.
+
+Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
+load on this path depends on inertia, which the model does not have. From the last equilibrium on, the work is taken as
+the least that the change needs, and as 0 if energy is released; this energy is lost. While surfaces are detached,
+neither work nor losses change.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ...columns import added_by
 from ...contact.constraint import Mask
@@ -14,9 +26,11 @@ from ...job import limits
 from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Sphere, Wave
 from ...job.yaml_text import Fault
+from ...march.constants import ENERGY
 from ...parallel.slab import Array
 from ...physics.body import remembers
 from ...physics.entries import Entry, Saved, Units
+from ...physics.measures import Measures
 from ..effect import (
     BY_THEORY,
     EXTRAPOLATION,
@@ -29,15 +43,24 @@ from ..effect import (
     Effect,
     Instant,
 )
-from . import adhesive_law
-from .adhesive_law import NO_ENERGIES, AdhesiveEnergies
-from .law import Law, cell_of, modulus_of, smallest_range
-from .section import AUTO, Adhesion, adhesion_law, chosen_range, doubt_range, doubts_of_adhesion
+from .section import (
+    AUTO,
+    Adhesion,
+    adhesion_law,
+    cell_of,
+    chosen_range,
+    doubt_range,
+    doubts_of_adhesion,
+    modulus_of,
+    smallest_range,
+)
 
 MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
 SAME = 1e-9  # rounding: relative tolerance on a range
 JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter above and below which these theories hold
 FULL_CONTACT = 0.56988  # physics: least Johnson's parameter for full contact of a wave without load
+LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
+FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
 SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
 
 
@@ -99,6 +122,51 @@ def _kind(tabor: float) -> str:
     if tabor < DMT_LIKE:
         return "as in that of Derjaguin, Muller and Toporov, pull-off near 2 pi w R"
     return "between the theories of Johnson, Kendall and Roberts (1.5 pi w R) and of Derjaguin, Muller and Toporov (2)"
+
+
+class AdhesiveEnergies(NamedTuple):
+    """Energies [J] since the start of a run with adhesion.
+
+    `work` of the rigid surface; energy of the `surfaces`, 0 at large gaps; energy `lost` in snaps; `error`, the sum
+    over all steps without a snap of the difference between work and energies.
+    """
+
+    work: float = 0.0
+    surfaces: float = 0.0
+    lost: float = 0.0
+    error: float = 0.0
+
+
+NO_ENERGIES = AdhesiveEnergies()
+
+
+def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
+    """Return the energies after a step, in a box with an `area` [m^2]."""
+    numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
+    surfaces = numbers["surface_energy"]
+    gained = instant.gained + surfaces - past.surfaces
+    dragged, doubt = _drag(before, measures, instant.moved)
+    work = numbers["work_of_load"] + dragged
+    if numbers["leaves_equilibrium"]:
+        work = max(work, gained)
+    else:
+        way = measures.approach - before.approach
+        doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
+    lost = work - gained
+    snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
+    error = past.error + ENERGY.value * instant.error_area * abs(instant.dissipated)
+    if snaps:
+        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, error)
+    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, error + abs(lost))
+
+
+def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
+    """Return the work of sliding by `moved` without friction of the interface, and its error [J]."""
+    (x, y), slid = moved, math.hypot(*moved)
+    if not slid:
+        return 0.0, 0.0
+    works = [-(one.force_x * x + one.force_y * y) - one.force_interface * slid for one in (before, now)]
+    return 0.5 * sum(works), 0.5 * abs(works[1] - works[0]) + FORCE_DOUBT * abs(works[1])
 
 
 @dataclass(frozen=True)
@@ -184,7 +252,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> Mask:
-        return Law.touches(gap)
+        return gap == 0.0
 
     @staticmethod
     def decide(job: Any) -> Decision:
@@ -231,7 +299,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
-                energies = adhesive_law.advance_energies(energies, instant, self._area)
+                energies = advance_energies(energies, instant, self._area)
             columns = (*columns[:2], energies.surfaces, energies.lost)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.decide is not None

@@ -32,31 +32,279 @@ Where the mean gap is given, c, z and t are centred, and w is scaled to keep thi
 Molinari, Comput. Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D.
 Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 have the working set. All numbers are dimensionless.
 
-`AdhesiveSolver` extends the solver, which needs the inverse of its operator, to a free body. The FFT does not invert
-the operator A of a free body. The operator B of a periodic body, with the same Green's function up to half the box,
-replaces it (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A - B)
-p` with the p of the pass before. One or two passes are usual.
+The attraction sigma, its energy gamma and its slope follow from a `Law`. It has a `kind` (EXPONENTIAL or DUGDALE), a
+strength s, a range rho and a ramp r,
 
-A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
-state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
-detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations (`FreeInverse`).
-Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the inverse of A on
-pressures of mean 0.
+    exponential  sigma(g) = s exp(-g/rho),            gamma(g) = s rho exp(-g/rho),
+    dugdale      sigma(g) = s ((rho - g)/r + 1/2), limited to 0..s, and -d gamma/dg = sigma.
+
+Over the ramp, at most 2 rho, a constant attraction falls to 0: in a cell where the gap rises by r it is the mean of
+the law without ramp, with the same energy gamma(0) = s rho. The exponential is the most expensive part of a loop, so
+energy and slope are computed from sigma.
+
+In the loops, which run over the rows of this rank and return partial sums for one Allreduce, q is the pressure
+K (g + h), to which a mean is added.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled import loop
 from ...contact import kernels
 from ...contact.certificate import LEAST_SHARE as SOLVER_LEAST_SHARE
-from ...contact.problem import Approach, Contact, Control, MeanPressure, Operator, Workspace
+from ...contact.constraint import Mask
+from ...contact.problem import Approach, Control, MeanPressure, Operator
 from ...parallel.slab import Array, Slab
 from ...physics.measures import Certificate
-from . import law as gap_kernels
-from .law import Law
+
+EXPONENTIAL, DUGDALE = 0, 1
+LOG_TWO = math.log(2.0)
+TAYLOR = tuple(1.0 / math.factorial(power) for power in range(14))  # series of exp, exact to rounding up to LOG_TWO/2
+FARTHEST = 700.0  # accuracy: largest exponent; exp(-x) of a larger x, below 1e-304, is taken as 0
+POWERS = 2.0 ** -np.arange(FARTHEST / LOG_TWO + 2.0)
+
+
+class Law(NamedTuple):
+    """Law of attraction in the units of a solve. Only the kind DUGDALE has a ramp."""
+
+    kind: int
+    strength: float
+    range: float
+    ramp: float = 0.0
+
+    @staticmethod
+    def touches(gap: Array) -> Mask:
+        """Return a map that is True where the gap is 0: surfaces touch there under pressure or tension."""
+        return gap == 0.0
+
+
+@loop
+def decay(x):
+    """Return `exp(-x)` for x >= 0, to a few units of rounding, in a form that compilers vectorize."""
+    near = x if x < FARTHEST else FARTHEST
+    whole = math.floor(near / LOG_TWO + 0.5)
+    rest = whole * LOG_TWO - near
+    result = TAYLOR[13]
+    for power in range(12, -1, -1):
+        result = result * rest + TAYLOR[power]
+    return result * POWERS[int(whole)] if x < FARTHEST else 0.0
+
+
+@loop
+def attraction(law, g):
+    """Return the attraction sigma of a law at the gap g."""
+    if law.kind == EXPONENTIAL:
+        return law.strength * decay(g / law.range)
+    return law.strength * min(max((law.range - g) / law.ramp + 0.5, 0.0), 1.0)
+
+
+@loop
+def energy(law, g, sigma):
+    """Return gamma(g), the energy per area needed to open the gap from g to infinity; sigma is the attraction at g."""
+    if law.kind == EXPONENTIAL:
+        return law.range * sigma
+    end = law.range + 0.5 * law.ramp
+    return sigma * (law.range - g if sigma == law.strength else 0.5 * (end - g))
+
+
+@loop
+def softening(law, sigma):
+    """Return the slope `-d sigma/dg` of a law where the attraction is sigma."""
+    if law.kind == EXPONENTIAL:
+        return sigma / law.range
+    return law.strength / law.ramp if 0.0 < sigma < law.strength else 0.0
+
+
+SHORT = 1e-3  # accuracy: longest way over the range for which the trapezoidal energy is used; its error is 1e-7
+
+
+@loop
+def attract(law, g, sigma):
+    """Put the attraction sigma(g) of a law into the map `sigma`."""
+    for j in range(g.shape[0]):
+        for i in range(g.shape[1]):
+            sigma[j, i] = attraction(law, g[j, i])
+
+
+@loop
+def press(g, q, sigma, step, image):
+    """Add `step image` to the pressure q. Return the number of open points and their sum of `q + sigma`."""
+    count, total = 0.0, 0.0
+    for j in range(g.shape[0]):
+        row_count, row_total = 0.0, 0.0
+        for i in range(g.shape[1]):
+            q[j, i] += step * image[j, i]
+            weight = 1.0 if g[j, i] > 0.0 else 0.0
+            row_count += weight
+            row_total += weight * (q[j, i] + sigma[j, i])
+        count += row_count
+        total += row_total
+    return count, total
+
+
+@loop
+def pressure_residual(g, q, sigma, mean, working, c):
+    """Put `q + mean + sigma` into c on the working set (open points, and closed points under tension), 0 elsewhere.
+    Return the size of the set, the sum of c, the sum of sigma over all points, and the largest -g."""
+    count, total, attracted = 0.0, 0.0, 0.0
+    lowest, deepest = np.empty(g.shape[1]), -np.inf
+    for i in range(lowest.size):
+        lowest[i] = np.inf
+    for j in range(g.shape[0]):
+        row_count, row_total, row_attracted = 0.0, 0.0, 0.0
+        for i in range(g.shape[1]):
+            pushed = q[j, i] + mean + sigma[j, i]
+            lowest[i] = min(lowest[i], g[j, i])
+            row_attracted += sigma[j, i]
+            inside = (g[j, i] > 0.0) | (pushed < 0.0)
+            working[j, i] = inside
+            c[j, i] = pushed if inside else 0.0
+            row_count += 1.0 if inside else 0.0
+            row_total += pushed if inside else 0.0
+        count += row_count
+        total += row_total
+        attracted += row_attracted
+    for i in range(lowest.size):
+        deepest = max(deepest, -lowest[i])
+    return count, total, attracted, deepest
+
+
+@loop
+def certificate_sums(working, g, h, q, mean, sigma, z):
+    """Return the sums of `certify_gap`: over all points of w, w u and w u^2, over the working set of w |z|, |c| and c.
+
+    Here `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g + h`, and the weight `w = |p| +
+    |c|`.
+    """
+    load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(g.shape[0]):
+        row_load, row_first, row_second, row_wrong, row_spurious, row_net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(g.shape[1]):
+            p, u, weight = q[j, i] + mean, g[j, i] + h[j, i], 1.0 if working[j, i] else 0.0
+            c = weight * (p + sigma[j, i])
+            size = abs(p) + abs(c)
+            row_load += size
+            row_first += size * u
+            row_second += size * u * u
+            row_wrong += weight * size * abs(z[j, i])
+            row_spurious += abs(c)
+            row_net += c
+        load += row_load
+        first += row_first
+        second += row_second
+        wrong += row_wrong
+        spurious += row_spurious
+        net += row_net
+    return load, first, second, wrong, spurious, net
+
+
+@loop
+def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
+    """Return the sums over the working set of z, t, c z, e z and c t, with `c = q + mean + sigma` and its change in the
+    last step, `e = step image + sigma - sigma_old + shift`."""
+    sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(z.shape[0]):
+        row_z, row_t, row_c_z, row_e_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(z.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            z_here, t_here = weight * z[j, i], weight * t[j, i]
+            c = q[j, i] + mean + sigma[j, i]
+            row_z += z_here
+            row_t += t_here
+            row_c_z += c * z_here
+            row_e_z += (step * image[j, i] + sigma[j, i] - sigma_old[j, i] + shift) * z_here
+            row_c_t += c * t_here
+        sum_z += row_z
+        sum_t += row_t
+        c_z += row_c_z
+        e_z += row_e_z
+        c_t += row_c_t
+    return sum_z, sum_t, c_z, e_z, c_t
+
+
+@loop
+def lead(g, t, step, way):
+    """Put the change of the gap `max(g - step t, 0) - g` into `way`. Return the sum of the gaps after it, and by how
+    much the limit 0 has raised this sum."""
+    total, cut = 0.0, 0.0
+    for j in range(t.shape[0]):
+        row_total, row_cut = 0.0, 0.0
+        for i in range(t.shape[1]):
+            wanted = g[j, i] - step * t[j, i]
+            kept = wanted if wanted > 0.0 else 0.0
+            way[j, i] = kept - g[j, i]
+            row_total += kept
+            row_cut += kept - wanted
+        total += row_total
+        cut += row_cut
+    return total, cut
+
+
+@loop
+def curvature(law, g, q, mean, sigma, way, image):
+    """Return the sums of `-c w`, `w K w`, `w^2 (-d sigma/dg)` and w, and the largest -w/g, for the change w of the gap
+    (`way`) with the image K w (`image`)."""
+    slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
+    fastest, most = np.empty(g.shape[1]), 0.0
+    for i in range(fastest.size):
+        fastest[i] = 0.0
+    for j in range(g.shape[0]):
+        row_slope, row_stiff, row_soft, row_total = 0.0, 0.0, 0.0, 0.0
+        for i in range(g.shape[1]):
+            w = way[j, i]
+            row_slope -= (q[j, i] + mean + sigma[j, i]) * w
+            row_stiff += w * image[j, i]
+            row_soft += w * w * softening(law, sigma[j, i])
+            row_total += w
+            fastest[i] = max(fastest[i], -w / g[j, i] if w < 0.0 else 0.0)
+        slope += row_slope
+        stiff += row_stiff
+        soft += row_soft
+        total += row_total
+    for i in range(fastest.size):
+        most = max(most, fastest[i])
+    return slope, stiff, soft, total, most
+
+
+@loop
+def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
+    """Put `g + step way`, at least 0, into `g_new`, and the attraction there into `sigma_new`. Return the change of
+    energy, the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d = g_new - g`, and the sum of the
+    terms' magnitudes. For short ways the change of gamma is d times the mean attraction, which rounds less."""
+    total, size = 0.0, 0.0
+    for j in range(g.shape[0]):
+        row_total, row_size = 0.0, 0.0
+        for i in range(g.shape[1]):
+            now, d, pull = g[j, i], step * way[j, i], sigma[j, i]
+            new = now + d if now + d > 0.0 else 0.0
+            pull_new = attraction(law, new)
+            surface = energy(law, now, pull) - energy(law, new, pull_new)
+            if law.kind == EXPONENTIAL and abs(d) < SHORT * law.range:
+                surface = 0.5 * d * (pull + pull_new)
+            push = q[j, i] + mean + 0.5 * step * image[j, i]
+            g_new[j, i] = new
+            sigma_new[j, i] = pull_new
+            row_total += d * push + surface
+            row_size += abs(d * push) + abs(surface)
+        total += row_total
+        size += row_size
+    return total, size
+
+
+@loop
+def surface_energy(law, g):
+    """Return the sum of `-gamma(g)`, the energy of the surfaces."""
+    total = 0.0
+    for j in range(g.shape[0]):
+        row = 0.0
+        for i in range(g.shape[1]):
+            row -= energy(law, g[j, i], attraction(law, g[j, i]))
+        total += row
+    return total
+
 
 # accuracy
 SHARPER = 10.0  # factor on the complementarity; with it loads are as accurate as without adhesion
@@ -129,7 +377,7 @@ def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, 
     this range. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS times,
     their sum NET times.
     """
-    *sums, spurious, net = slab.sum(*gap_kernels.certificate_sums(working, g, it.heights, q, it.m, sigma, z))
+    *sums, spurious, net = slab.sum(*certificate_sums(working, g, it.heights, q, it.m, sigma, z))
     load, first, second, wrong = sums
     least = LEAST_TRACTION * it.law.strength
     spread, mean = 0.0, 0.0
@@ -217,7 +465,7 @@ class GapSolver:
             mean_g = given
         np.add(gap, heights, out=self._q)
         operators.inverse.apply(self._q, self._q)
-        gap_kernels.attract(law, gap, self._sigma)
+        attract(law, gap, self._sigma)
         d = control.value if isinstance(control, Approach) else 0.0
         return GapIterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
 
@@ -231,12 +479,12 @@ class GapSolver:
         """Update the pressure by the last step, mark the working set, and put c into the map of the way. Return the
         size of the set, and whether the surfaces have detached; collective."""
         q, sigma, before = self._q, self._sigma, it.m
-        count, total = self.slab.sum(*gap_kernels.press(g, q, sigma, it.share, self._image))
+        count, total = self.slab.sum(*press(g, q, sigma, it.share, self._image))
         if it.given is None:
             it.m = self._uniform(it, it.mean_gap)
         else:
             it.m = -total / count if count else self._least_uniform(it)
-        sums = gap_kernels.pressure_residual(g, q, sigma, it.m, self._working, self._way)
+        sums = pressure_residual(g, q, sigma, it.m, self._working, self._way)
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
             it.m -= total / members
@@ -291,7 +539,7 @@ class GapSolver:
         Collective."""
         working = self._working
         step = it.share, self._image, self._other_sigma, it.change
-        sums = gap_kernels.gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
+        sums = gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
         sum_z, sum_t, c_z, e_z, c_t = self.slab.sum(*sums)
         beta = max(0.0, e_z / scale) if scale > 0.0 else 0.0
         if c_z + beta * c_t <= LEAST_DESCENT * c_z:
@@ -306,7 +554,7 @@ class GapSolver:
         share = self._share(it, g)
         for _ in range(MAX_TRIES if share > 0.0 else 0):
             to = share, self._way, self._image, out, self._other_sigma
-            rise, size = self.slab.sum(*gap_kernels.move(it.law, g, self._q, it.m, self._sigma, *to))
+            rise, size = self.slab.sum(*move(it.law, g, self._q, it.m, self._sigma, *to))
             mean = it.mean_gap
             if it.given is None:
                 mean += share * it.moved
@@ -322,9 +570,11 @@ class GapSolver:
     def _share(self, it: GapIterate, g: Array) -> float:
         """Find a way along the direction. Return the share of it to go; collective."""
         for _ in range(MAX_TRIES):
-            total, cut = self.slab.sum(*gap_kernels.lead(g, self._t, it.step, self._way))
+            total, cut = self.slab.sum(*lead(g, self._t, it.step, self._way))
             if it.given is not None and cut > 0.0:
-                gap_kernels.rescale(g, it.given * self.slab.points / total, self._way)
+                self._way += g  # the gap after the step, scaled to its mean
+                self._way *= it.given * self.slab.points / total
+                self._way -= g
             wanted, most = self._newton(it, g)
             if cut == 0.0 or wanted > 0.0:
                 break
@@ -336,7 +586,7 @@ class GapSolver:
         """Return Newton's or the majorized step as a share of the way, and the largest share that gaps allow;
         collective."""
         it.operators.inverse.apply(self._way, self._image)
-        *sums, fastest = gap_kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
+        *sums, fastest = curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
         own, loaded = self.slab.points * it.moved**2 / it.operators.least_mean, isinstance(it.control, MeanPressure)
@@ -344,195 +594,3 @@ class GapSolver:
         it.stable = true > LEAST_CURVATURE * major
         wanted = slope / (true if it.stable else major) if major > 0.0 else 0.0
         return wanted, 1.0 / fastest if fastest > 0.0 else math.inf
-
-
-MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
-
-
-@dataclass(frozen=True)
-class FreeInverse:
-    """Inverse of the operator `free` of a free body, by conjugate gradients with the inverse for a `repeated` body,
-    which has the same Green's function up to half the box: a dozen steps give five digits. The energy of the error is
-    below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate results.
-
-    If `means` is False, pressures have the mean 0, and mean displacements are ignored.
-    """
-
-    slab: Slab
-    free: Operator
-    repeated: GapOperators
-    tolerance: float
-    maps: tuple[Array, Array, Array, Array]
-    means: bool
-
-    def apply(self, field: Array, out: Array) -> Array:
-        """Put the pressure that causes the displacement `field` into `out`; collective."""
-        r, z, t, image = self.maps
-        r[...] = field
-        t[...] = self._precondition(r, z)
-        size = self._product(r, z)
-        goal = self.tolerance**2 * size
-        out.fill(0.0)
-        for _ in range(MAX_STEPS):
-            if not size > goal:
-                break
-            self.free.apply(t, image)
-            step, before = size / self._product(t, image), size
-            out += np.multiply(t, step, out=z)
-            r -= np.multiply(image, step, out=z)
-            size = self._product(r, self._precondition(r, z))
-            t *= size / before
-            t += z
-        return out
-
-    def _precondition(self, r: Array, z: Array) -> Array:
-        self.repeated.inverse.apply(r, z)
-        if self.means:
-            z += self.slab.sum(float(r.sum()))[0] / self.slab.points / self.repeated.least_mean
-        return z
-
-    def _product(self, a: Array, b: Array) -> float:
-        return self.slab.sum(float(np.vdot(a, b)))[0]
-
-
-MAX_PASSES = 12  # tuning: limit on passes of a free body before A itself is used; one to three are usual
-LEFT = 0.8  # accuracy: tolerance of a solve with A over the tolerance of the run; the rest is for the inverse
-DIGITS = 0.01  # accuracy: relative error of the inverse of A, over the tolerance
-UNSETTLED = "did not settle in a free box"
-LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of the lagged part that is made
-
-
-@dataclass
-class AdhesiveSolver:
-    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic body."""
-
-    gaps: GapSolver
-    workspace: Workspace
-    tolerance: float
-    free: Operator | None = None
-
-    def solve(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array | None,
-        out: Array,
-        loose: float = 1.0,
-    ) -> tuple[Contact, bool]:
-        """Solve from the map `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
-
-        `free_correction` is `(A - B) p` of a free body and is updated. `loose` multiplies the tolerance. Return the
-        contact, and True if the surfaces have detached.
-        """
-        tolerance = loose * self.tolerance
-        if self.free is None or free_correction is None:
-            found = self.gaps.solve(law, heights, control, gap, tolerance)
-            out[...] = found.p
-            u = self.workspace.displacement
-            np.add(gap, heights, out=u)
-            u += found.d
-            return self._contact(found, out, found.iterations), found.detached
-        start = self.workspace.pressure
-        start[...] = gap
-        found, iterations = self._solve_fixed_point(law, heights, control, gap, free_correction, out, tolerance)
-        if found.failure:
-            gap[...] = start
-            found = self._solve_free(law, heights, control, gap, free_correction, out, tolerance)
-            iterations += found.iterations
-        return self._contact(found, out, iterations), found.detached
-
-    def _solve_fixed_point(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array,
-        out: Array,
-        tolerance: float,
-    ) -> tuple[GapSolution, int]:
-        """Repeat the solve of a free body until `free_correction` is constant. Return the solution, with a failure if
-        it does not settle, and the iterations of all passes; collective."""
-        iterations, share, last = 0, 1.0, free_correction
-        for passes in range(1, MAX_PASSES + 1):
-            found = self.gaps.solve(law, heights - free_correction, control, gap, tolerance)
-            iterations += found.iterations
-            found, change, worst = self._compare(heights, control, gap, found, out)
-            share = self._share(share, out, change, last) if passes > 1 else 1.0
-            last = change
-            free_correction += share * change
-            if found.failure or worst <= tolerance or (found.detached and passes == 1):
-                return found, iterations
-            if passes > 1 and (found.jumped or found.detached):
-                break
-        return replace(found, failure=UNSETTLED), iterations
-
-    def _solve_free(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array,
-        out: Array,
-        tolerance: float,
-    ) -> GapSolution:
-        """Solve with the operator of the free body and update `free_correction`; collective."""
-        assert self.free is not None
-        work, repeated = self.workspace, self.gaps.operators
-        maps = (work.pressure, work.displacement, work.other_displacement, free_correction)  # all in double precision
-        inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
-        operators = repeated._replace(operator=self.free, inverse=inverse)
-        if isinstance(control, Approach):
-            operators = operators._replace(mean=math.inf, least_mean=math.inf)
-            found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
-            found = replace(found, d=control.value)
-        else:
-            work.displacement.fill(1.0)
-            lifted = heights - control.value * self.free.apply(work.displacement, work.displacement)
-            found = self.gaps.solve(law, lifted, control, gap, LEFT * tolerance, operators)
-        found, _, worst = self._compare(heights, control, gap, found, out)
-        repeated.operator.apply(out, free_correction)
-        np.subtract(work.displacement, free_correction, out=free_correction)
-        if not found.failure and worst > tolerance:
-            asked = f"changes are {worst:.3g} where {tolerance:.3g} was asked for"
-            return replace(found, failure=f"{UNSETTLED}: {asked}")
-        return found
-
-    def _compare(
-        self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
-    ) -> tuple[GapSolution, Array, float]:
-        """Put the pressure into `out`; collective. Return the solution with its error on the free body in the
-        certificate, the displacement of the free body minus that of the solution, and the size of this difference."""
-        assert self.free is not None
-        out[...] = found.p
-        change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
-        change -= found.d
-        found, worst = self._judge(control, found, out, change)
-        return found, change, worst
-
-    def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
-        """Add the change of displacements in a pass to the certificate, except a change of the approach. Return the
-        solution and this error; collective."""
-        certificate, slab = found.certificate, self.workspace.slab
-        load, sum_change = slab.sum(*gap_kernels.weighted_sums(p, change))
-        shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
-        (wrong,) = slab.sum(gap_kernels.weigh_off(p, change, shift))
-        worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0
-        certificate = replace(certificate, complementarity=max(certificate.complementarity, worst))
-        return replace(found, certificate=certificate, d=found.d + shift), worst
-
-    def _share(self, share: float, p: Array, change: Array, last: Array) -> float:
-        """Return the share of a change to make: Aitken's extrapolation of the last two, weighted by the pressure;
-        collective."""
-        weight, difference = np.abs(p), change - last
-        along = float((weight * last * difference).sum())
-        along, size = self.workspace.slab.sum(along, float((weight * difference**2).sum()))
-        wanted = -share * along / size if size > 0.0 else 1.0
-        return min(max(wanted, LEAST_SHARE), MOST_SHARE)
-
-    def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
-        """Return the solution as a contact, whose displacement is in the workspace."""
-        return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)

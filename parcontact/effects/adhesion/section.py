@@ -1,5 +1,22 @@
 """The `adhesion` section of a job, the law of attraction that it defines, and warnings about implausible magnitudes.
 
+With the work of adhesion w [J/m^2], the range rho [m] and the gap g,
+
+    exponential  sigma(g) = (w/rho) exp(-g/rho),          gamma(g) = w exp(-g/rho),
+    dugdale      sigma(g) = w/rho for g < rho, else 0,    gamma(g) = w max(1 - g/rho, 0).
+
+A node that crosses the end of Dugdale's law would snap, with an error proportional to the side h of the cells. So
+the computed law ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end of the
+process zone, where the gap rises by about 2 rho h/l in a cell.
+
+The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). Tabor's
+and Johnson's parameters classify adhesive contacts,
+
+    mu = (R w^2/(E*^2 rho^3))^(1/3),        alpha^2 = 2 w lambda/(pi^2 E* h^2),
+
+of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose
+crests are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
+
 A sphere attracts a flat body at the gap d with `2 pi R gamma(d)`, of which the share `gamma(d + r^2/(2 R))/gamma(d)`
 comes from points further than r from its axis. Summed over the points of a mesh with cells h, the force of the
 exponential law has an error of up to `4 exp(-2 pi^2 R rho/h^2)`, by Poisson's sum of a Gaussian.
@@ -9,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
@@ -20,7 +37,6 @@ from ...job.advice import more_points
 from ...job.calculation import Grid
 from ...job.parts import Part, Positive
 from ...job.surfaces import Sphere
-from .law import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
 
 CELLS = 2.0  # accuracy: process zone over the cell with the range `auto`; the error of pull-off is 0.6 %
 AUTO: Literal["auto"] = "auto"
@@ -41,6 +57,53 @@ class Adhesion(Part):
     range: Range = Field(default=AUTO, description="a positive range [m], or auto")
     law: Literal["exponential", "dugdale"] = "exponential"
     detached: Literal["end", "open"] = "end"
+
+
+@dataclass(frozen=True)
+class AdhesionLaw:
+    """Law of adhesion: work [J/m^2], range [m], kind, and the ramp [m] of Dugdale's law."""
+
+    work: float
+    range: float
+    kind: Literal["exponential", "dugdale"] = "exponential"
+    ramp: float = 0.0
+
+    @property
+    def strength(self) -> float:
+        """Largest attraction [Pa]."""
+        return self.work / self.range
+
+    def process_zone(self, modulus: float) -> float:
+        """Return the length l of the process zone [m] for the `modulus` E* [Pa]."""
+        return modulus * self.range**2 / self.work
+
+    def tabor(self, modulus: float, radius: float) -> float:
+        """Return Tabor's parameter for the `modulus` E* [Pa] and the radius of a sphere [m]."""
+        return (radius * self.work**2 / (modulus**2 * self.range**3)) ** (1.0 / 3.0)
+
+    def johnson(self, modulus: float, length: float, amplitude: float) -> float:
+        """Return Johnson's parameter for the `modulus` E* [Pa] and a wave of this length [m] and amplitude [m]."""
+        return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / abs(amplitude)
+
+
+def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:
+    """Return the ramp of Dugdale's law [m], 2 rho h/l and at most 2 rho, for E* [Pa] and the side h of a cell [m]."""
+    return 2.0 * law.range * cell / max(law.process_zone(modulus), cell)
+
+
+def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:
+    """Return the range [m] whose process zone is as long as `cells` cells with the side `cell` [m], for E* [Pa]."""
+    return math.sqrt(cells * cell * work / modulus)
+
+
+def modulus_of(material: Any) -> float:
+    """Return E* = 2 G/(1 - nu) of the relaxed body [Pa]."""
+    return float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
+
+
+def cell_of(grid: Grid) -> float:
+    """Return the longer side of a cell [m] among the directions with several points."""
+    return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)
 
 
 def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:

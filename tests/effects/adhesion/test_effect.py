@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from parcontact.effects.adhesion.adhesive_law import (
-    FORCE_DOUBT,
-    JUMPS,
-    PUSHED,
-    SURFACES,
-    AdhesiveEnergies,
-    advance_energies,
-)
+from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, advance_energies
 from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.effects.effect import SolvedContact
 from parcontact.errors import InputError
@@ -287,8 +280,9 @@ def test_energies_of_a_step(
 ) -> None:
     """Work, energy of surfaces, loss in snaps and error after a step of known works, to rounding. Surfaces take 1 J
     from 2 J, and the body 3 J. The trapezoidal rule for the path and for the drag has an error of half the change."""
+    numbers = {"surface_energy": 1.0, "work_of_load": pushed, "leaves_equilibrium": float(jumps)}
     instant: Any = SimpleNamespace(
-        solved=SimpleNamespace(numbers={SURFACES: 1.0, PUSHED: pushed, JUMPS: float(jumps)}),
+        solved=SimpleNamespace(numbers=numbers),
         before=Measures(pressure=1.0, force_x=force[0]),
         measures=Measures(pressure=7.0, force_x=force[1], approach=approach),
         gained=3.0,

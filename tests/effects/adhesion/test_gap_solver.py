@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from parcontact.contact.problem import Approach, Control, MeanPressure, Operator, Workspace
-from parcontact.effects.adhesion import law
-from parcontact.effects.adhesion.gap_solver import AdhesiveSolver, GapOperators, GapSolution, GapSolver
-from parcontact.effects.adhesion.law import Law
+from parcontact.effects.adhesion import gap_solver
+from parcontact.effects.adhesion.adhesive_law import AdhesiveSolver
+from parcontact.effects.adhesion.gap_solver import GapOperators, GapSolution, GapSolver, Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -148,57 +148,57 @@ def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() 
 
 
 S, RHO = 2.0, 0.3
-LAWS = [law.Law(law.EXPONENTIAL, S, RHO), law.Law(law.DUGDALE, S, RHO, 0.4), law.Law(law.DUGDALE, S, RHO, 2 * RHO)]
+LAWS = [Law(gap_solver.EXPONENTIAL, S, RHO), *(Law(gap_solver.DUGDALE, S, RHO, ramp) for ramp in (0.4, 2 * RHO))]
 
 
-def attraction(one: law.Law, gap: np.ndarray) -> np.ndarray:
-    if one.kind == law.EXPONENTIAL:
+def attraction(one: Law, gap: np.ndarray) -> np.ndarray:
+    if one.kind == gap_solver.EXPONENTIAL:
         return S * np.exp(-gap / RHO)
     return np.interp(gap, RHO + 0.5 * one.ramp * np.array([-1.0, 1.0]), [S, 0.0])
 
 
 def test_decay() -> None:
     """The exponential function of the C library, to what rounding x does to it; 0 beyond 1e-304."""
-    found = [law.decay(x) for x in np.linspace(0.0, 699.0, 2001)]
+    found = [gap_solver.decay(x) for x in np.linspace(0.0, 699.0, 2001)]
     assert_allclose(found, np.exp(-np.linspace(0.0, 699.0, 2001)), rtol=700 * np.finfo(float).eps)
-    assert [law.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
+    assert [gap_solver.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
 
 
 def test_surfaces_touch_where_the_gap_is_closed() -> None:
-    assert law.Law.touches(np.array([0.0, 1e-300, 0.5])).tolist() == [True, False, False]
+    assert Law.touches(np.array([0.0, 1e-300, 0.5])).tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("one", LAWS)
-def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
+def test_energy_and_slope_of_the_attraction(one: Law) -> None:
     """`d gamma/dg = -sigma` by central differences (second order, 1e-4 of the range), `gamma(0) = s rho`, and sigma's
     slope is the softening; between the corners of the laws."""
     step = 1e-4 * RHO
 
     def energy(gap: float) -> float:
-        return law.energy(one, gap, law.attraction(one, gap))
+        return gap_solver.energy(one, gap, gap_solver.attraction(one, gap))
 
     assert_allclose(energy(0.0), S * RHO, rtol=1e-15)
     for gap in (0.1 * RHO, 0.7 * RHO, 1.2 * RHO, 1.5 * RHO, 2.1 * RHO):
         low, high = gap - step, gap + step
-        here = law.attraction(one, gap)
+        here = gap_solver.attraction(one, gap)
         assert_allclose((energy(low) - energy(high)) / (2 * step), here, rtol=1e-7)
-        slope = (law.attraction(one, low) - law.attraction(one, high)) / (2 * step)
-        assert_allclose(slope, law.softening(one, here), rtol=1e-7)
+        slope = (gap_solver.attraction(one, low) - gap_solver.attraction(one, high)) / (2 * step)
+        assert_allclose(slope, gap_solver.softening(one, here), rtol=1e-7)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 @pytest.mark.parametrize("one", LAWS)
-def test_change_of_energy(one: law.Law, size: float) -> None:
+def test_change_of_energy(one: Law, size: float) -> None:
     """Along a way that closes gaps, and along a short one, by the integral of the attraction; the mean attraction of a
     short way of the exponential law is exact to 1e-7."""
     gap, q, image, way = np.random.default_rng(4).random((4, 5, 7))
     way, new, sigma, sigma_new = -size * way, *(np.empty_like(gap) for _ in range(3))
     sigma[...] = attraction(one, gap)
-    rise, magnitude = law.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    rise, magnitude = gap_solver.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
     assert_allclose(new, np.maximum(gap + 0.5 * way, 0.0), atol=1e-15)
     assert_allclose(sigma_new, attraction(one, new), rtol=1e-13, atol=1e-15)
-    surface = [law.energy(one, *at) for at in zip(gap.ravel(), sigma.ravel(), strict=True)]
-    surface -= np.array([law.energy(one, *at) for at in zip(new.ravel(), sigma_new.ravel(), strict=True)])
+    surface = [gap_solver.energy(one, *at) for at in zip(gap.ravel(), sigma.ravel(), strict=True)]
+    surface -= np.array([gap_solver.energy(one, *at) for at in zip(new.ravel(), sigma_new.ravel(), strict=True)])
     exact = (0.5 * way * (q + 0.2 + 0.25 * image)).sum() + surface.sum()
     assert_allclose(rise, exact, rtol=1e-12, atol=1e-12 + 1e-7 * np.abs(surface).sum() * (size < 1.0))
     assert magnitude >= abs(rise) * (1.0 - 1e-12)
