@@ -24,7 +24,7 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.files import tables
 from parcontact.job import Job, load, load_cases
 from parcontact.physics.prony import complex_modulus
-from parcontact.results import results, slide, style, theory_table
+from parcontact.results import info, results, slide, style
 from parcontact.theory import hertz
 
 JOBS = Path(__file__).resolve().parents[1] / "jobs" / "paper"
@@ -64,7 +64,7 @@ def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
 def explain(axes: Axes, directory: Path, **look: Any) -> None:
     """Draw the legend of a panel, with the settings of the theory if they are known and the same for all cases of a
     sweep."""
-    axes.legend(**look, title=theory_table.describe_settings(directory) or None, title_fontsize=TITLE)
+    axes.legend(**look, title=info.describe_settings(directory) or None, title_fontsize=TITLE)
 
 
 def moduli(job: Job) -> tuple[float, float]:

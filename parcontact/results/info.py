@@ -2,16 +2,17 @@
 
 * Descriptions of files of a run and of output directories, with checks for damage.
 * Headline of a report: a sentence with the main results of a job and their errors.
+* Comparison of a run with Persson's theory, and the settings of its predictions (theory.yaml).
 * References to cite for a run: this program, and the references for its job (`files.provenance`).
 """
 
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -22,12 +23,12 @@ from ..errors import InputError
 from ..files import checkpoint, fields, hdf5, outputs, tables
 from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
-from ..job import Job
+from ..job import Job, Stage, yaml_text
 from ..job.listing import answers
 from ..job.reading import CASES
 from ..parallel.slab import Slab
 from ..printed import quantity, with_error
-from . import slide, theory_table
+from . import slide
 from .results import PLACES, Results, describe_end, read_cases, swept_keys
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
@@ -185,13 +186,13 @@ def _theory(found: Results) -> Iterator[str]:
     run = Results(found.path, "run")
     count = f"  Persson's theory: {len(run.read(outputs.THEORY.table)['time'])} rows, "
     try:
-        settings = theory_table.read_settings(run.path)
+        settings = read_settings(run.path)
     except InputError:
         yield count + "of unknown settings"
         raise
     yield count + (settings.sentence if settings else "of unknown settings")
     if job := run.job:
-        yield from (f"  {text}" for text in theory_table.describe_theory(run.path, job.history, job.grid.dx))
+        yield from (f"  {text}" for text in describe_theory(run.path, job.history, job.grid.dx))
 
 
 def _curve(found: Results) -> Iterator[str]:
@@ -430,3 +431,104 @@ def describe_citations(directory: Path) -> str:
         raise InputError(damaged) from error
     lines = [f"{directory}: please cite", "", f"* {found.program or PROGRAM}", "    this program (CITATION.cff)"]
     return "\n".join([*lines, *(line for reference, what in cited for line in (f"* {reference}", f"    {what}"))])
+
+
+(FILE,) = outputs.THEORY.others  # settings of the predictions in theory.csv
+OF_WAVES = {"continuum": "the spectrum of the surface", "lattice": "the waves of the surface in its box"}
+
+
+class TheorySettings(NamedTuple):
+    """Settings of a prediction: factor that corrects friction in partial contact, and kind of waves, continuum or
+    lattice."""
+
+    gamma: float
+    waves: str
+
+    @property
+    def sentence(self) -> str:
+        """Return the settings as text."""
+        return f"gamma {self.gamma:g}, for {OF_WAVES.get(self.waves, self.waves)}"
+
+
+def read_settings(directory: Path) -> TheorySettings | None:
+    """Return the settings of the theory table in a directory, None without any; raises InputError for a damaged
+    file."""
+    path = directory / FILE
+    try:
+        text = path.read_bytes()
+        data = yaml_text.parse(text, FILE).data
+        if not text.endswith(b"\n") or "program" not in data:
+            raise KeyError(FILE)
+        return TheorySettings(float(data["gamma"]), str(data["waves"]))
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path} is damaged: it does not say gamma and waves") from error
+
+
+def shared(directories: Iterable[Path]) -> TheorySettings | None:
+    """Return the settings that the theory tables in these directories share, or None. Raises as `read_settings`."""
+    found = {read_settings(directory) for directory in directories if (directory / outputs.THEORY.table).is_file()}
+    return found.pop() if len(found) == 1 else None
+
+
+def describe_settings(directory: Path) -> str:
+    """Return a sentence on the settings of Persson's theory in a directory, or in the cases of a sweep there; '' if
+    there is no theory."""
+    try:
+        settings = shared([directory, *directory.glob("cases/*")])
+    except InputError as error:
+        return f"theory of unknown settings: {error}"
+    return f"Persson's theory: {settings.sentence}" if settings else ""
+
+
+class ComparedResult(NamedTuple):
+    """A result [-] of the theory, the run's result (None without a run), and the error of the run's result (NaN if
+    unknown)."""
+
+    name: str
+    theory: float
+    run: float | None
+    error: float = math.nan
+
+
+def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[ComparedResult]:
+    """Return results of theory.csv and of measures.csv in a directory, none without theory.csv. `cell` is the spacing
+    of the grid along x [m].
+
+    Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), with the corrected area
+    for the run; without a slide, the contact area of the last instant. Raises InputError for damaged tables.
+    """
+    predicted, found = (_results(directory / name, history, cell) for name in (outputs.THEORY.table, outputs.RUN.table))
+    nothing = None, math.nan
+    return [ComparedResult(name, value, *found.get(name, nothing)) for name, (value, _) in predicted.items()]
+
+
+def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
+    """Return results and their errors by name."""
+    columns = Results(path.parent).read(path.name)
+    if not columns.get("time"):
+        return {}
+    columns.setdefault(slide.CORRECTED, columns["contact_area"])
+    found = slide.measure_slide(history, columns)
+    if found is None:
+        area = columns[slide.CORRECTED][-1]
+        return {"contact area": (area, columns.get(slide.ERRORS[1], [math.nan])[-1] * area)}
+    within = slide.absolute_errors(history, columns, cell)
+    values = {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area_corrected}
+    defined = {name: value for name, value in values.items() if value == value}
+    return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in defined.items()}
+
+
+def describe_theory(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:
+    """Yield a sentence on the predictions, if there is a theory.csv. Raises InputError for damaged tables."""
+    results = compare_with_theory(directory, history, cell)
+    if results:
+        pairs = (f"{one.name} {one.theory:.3g}{_against_run(one)}" for one in results)
+        yield f"Persson's theory predicts {', '.join(pairs)}"
+
+
+def _against_run(one: ComparedResult) -> str:
+    return "" if one.run is None else f" (run: {with_error(one.run, one.error)})"

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..files import hdf5, outputs
 from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
-from . import band_charts, maps, plotted_run, style, theory_table
+from . import band_charts, info, maps, plotted_run, style
 from .panels import Axis, Line, Panel, offered, picture
 from .plotted_run import PlottedRun
 from .results import Results, read_cases, swept_keys
@@ -143,7 +143,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    lines = *titles[:1], theory_table.describe_settings(directory), *_name_missing(directory)
+    lines = *titles[:1], info.describe_settings(directory), *_name_missing(directory)
     return picture("\n".join(filter(None, lines)), groups, fields, options.log)
 
 

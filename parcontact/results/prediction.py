@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from .. import __version__
 from .. import job as jobs
 from ..bands.choice import cut_bands
 from ..column import Table
@@ -27,14 +28,22 @@ from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..theory import full_contact, persson
 from ..theory.persson import Memory, Rings, SlidingLeg, follow
-from . import theory_table
-from .theory_table import TheorySettings
+from .info import FILE, TheorySettings, describe_theory
 
 ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
     "shapes with it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
 OF_SPECTRA = "surface: the theory takes the spectra of rough shapes, and this job has a measured map in addition"
+SETTINGS_HEAD = "# Settings of `parcontact theory` for theory.csv"
+SETTINGS = (
+    f"{SETTINGS_HEAD}.\n"
+    """\
+gamma: {gamma!r}  # corrects friction in partial contact
+waves: {waves}  # continuum: the job's spectrum; lattice: the waves of the surface in its box
+program: parcontact {version}
+"""
+)
 WavesOf = Literal["continuum", "lattice"]
 
 
@@ -176,7 +185,7 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     if not job.history:
         return _foretell_curve(job, settings)
     path = write_theory(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
-    compared = theory_table.describe_theory(path.parent, job.history, job.grid.dx)
+    compared = describe_theory(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *compared]
 
 
@@ -207,14 +216,30 @@ def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySet
     """Write a table and its settings; raises InputError for a path that cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(path, theory_table.is_own_table if settings else _is_own_curve) as file:
+        with files.replaced(path, is_own_table if settings else _is_own_curve) as file:
             lines = (map(float, values_of(table, row)) for row in rows)
             file.write(to_csv(names_of(table), lines).encode())
         if settings:
-            theory_table.write_settings(path.parent, settings)
+            write_settings(path.parent, settings)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
     return path
+
+
+def write_settings(directory: Path, settings: TheorySettings) -> None:
+    """Write the settings; raises OSError."""
+    with files.replaced(directory / FILE, is_our_settings) as file:
+        file.write(SETTINGS.format(**settings._asdict(), version=__version__).encode())
+
+
+def is_our_settings(path: Path) -> bool:
+    """Return True if a file of settings was written by this program; raises OSError."""
+    return path.read_bytes().startswith(SETTINGS_HEAD.encode())
+
+
+def is_own_table(path: Path) -> bool:
+    """Return True if a table has settings in its directory, and is therefore a table of theory; raises OSError."""
+    return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
 
 
 def _is_own_curve(path: Path) -> bool:

@@ -28,7 +28,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
-from . import band_charts, info, maps, plotted_run, slide, style, surface_summary, theory_table
+from . import band_charts, info, maps, plotted_run, slide, style, surface_summary
 from .curve_tables import (
     RC,
     Browser,
@@ -75,8 +75,8 @@ def describe_run(directory: Path) -> ReportSection:
     numbers = ReportTable(("measure", "last", "smallest", "largest", "unit"), rows)
     sentences = [
         *info.describe_run_in_words(run),
-        *theory_table.describe_theory(directory, run.job.history, run.job.grid.dx),
-        theory_table.describe_settings(directory),
+        *info.describe_theory(directory, run.job.history, run.job.grid.dx),
+        info.describe_settings(directory),
     ]
     found = plotted_run.panels_of_run(run)
     unnamed = [replace(one, shades=[replace(shade, name="") for shade in one.shades]) for one in found[1:]]
@@ -138,7 +138,7 @@ def describe_sweep(directory: Path) -> ReportSection:
     rows = read_cases(sweep.points)
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    settings, failed = theory_table.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
+    settings, failed = info.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
     sentences = list(filter(None, [settings, *failed]))
     return ReportSection(
         "Sweep", sentences, [table], [draw_panel(panel) for panel in band_charts.panels_of_sweep(directory)]

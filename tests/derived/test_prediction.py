@@ -19,8 +19,8 @@ from parcontact.job import Job, load
 from parcontact.march.curve import request
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.results import info, prediction, theory_table
-from parcontact.results.theory_table import TheorySettings
+from parcontact.results import info, prediction
+from parcontact.results.info import TheorySettings
 from parcontact.theory import full_contact
 
 ROUGH: dict[str, Any] = {
@@ -122,19 +122,16 @@ def test_settings_are_read_with_their_table(tmp_path: Path) -> None:
     for one in (ran, other):
         prediction.write_theory(one, iter([]), first)
     paths = [one.output.directory for one in (ran, other)]
-    assert theory_table.read_settings(paths[0]) == first
-    assert theory_table.shared(paths) == first
-    assert (
-        theory_table.describe_settings(paths[0])
-        == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
-    )
+    assert info.read_settings(paths[0]) == first
+    assert info.shared(paths) == first
+    assert info.describe_settings(paths[0]) == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
     prediction.write_theory(other, iter([]), second)
-    assert theory_table.shared(paths) is None
+    assert info.shared(paths) is None
     table = (paths[0] / "theory.csv").read_bytes()
     with pytest.raises(ZeroDivisionError):
         prediction.write_theory(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
     assert (paths[0] / "theory.csv").read_bytes() == table
-    assert theory_table.read_settings(paths[0]) == first
+    assert info.read_settings(paths[0]) == first
 
 
 def test_damaged_settings_are_stated_by_name(tmp_path: Path) -> None:
@@ -144,7 +141,7 @@ def test_damaged_settings_are_stated_by_name(tmp_path: Path) -> None:
     path = tmp_path / "out" / "theory.yaml"
     path.write_text("gamma: 0.5\n")
     damaged = f"{path} is damaged: it does not say gamma and waves"
-    assert theory_table.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
+    assert info.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
     (path.parent / "measures.csv").write_text("")
     stated, sound = info.describe_path(path.parent)
     assert not sound

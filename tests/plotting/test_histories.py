@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
 from parcontact.files import tables
-from parcontact.results import plots, theory_table
+from parcontact.results import info, plots, prediction
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -52,7 +52,7 @@ def test_theory_is_drawn_with_a_run(tmp_path: Path, drawn: list[Figure]) -> None
         assert np.allclose(np.array(found["theory"].get_xdata())[0], 0.0)
         assert "simulation" in found
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
-    theory_table.write_settings(out, theory_table.TheorySettings(0.5, "lattice"))
+    prediction.write_settings(out, info.TheorySettings(0.5, "lattice"))
     plots.plot([out])
     assert (
         drawn[1].get_suptitle().splitlines()[-1]

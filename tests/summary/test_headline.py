@@ -17,7 +17,7 @@ from parcontact.effects.adhesion.results import Columns, PullOff, describe_pull_
 from parcontact.errors import InputError
 from parcontact.files.provenance import cite_lines
 from parcontact.job import Stage
-from parcontact.results import info, page, theory_table
+from parcontact.results import info, page
 
 ROW = ("time", "distance", "pressure", "friction", "contact_area", "contact_area_corrected", "approach", "max_pressure")
 
@@ -143,13 +143,13 @@ def write_table(path: Path, head: str, *rows: str) -> None:
 def test_both_are_measured_alike_and_the_area_is_the_corrected_one(tmp_path: Path) -> None:
     """Constant friction after a peak: the mean over the last three quarters, 1 m to 4 m, is that constant exactly."""
     write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0.5", "1,1,0.2,0.25", "4,4,0.2,0.25")
-    assert list(theory_table.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
+    assert list(info.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
         "Persson's theory predicts mu_max 0.2, mu_dyn 0.2, contact area 0.25"
     ]
     write_table(
         tmp_path / "measures.csv", f"{HEAD},contact_area_corrected", "0,0,0,1,1", "1,1,0.4,0.75,0.5", "4,4,0.4,0.75,0.5"
     )
-    assert theory_table.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == [
+    assert info.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == [
         ("mu_max", pytest.approx(0.2), pytest.approx(0.4), math.nan),
         ("mu_dyn", pytest.approx(0.2), pytest.approx(0.4), math.nan),
         ("contact area", pytest.approx(0.25), pytest.approx(0.5), math.nan),
@@ -162,17 +162,17 @@ def test_errors_of_the_run_follow_its_results(tmp_path: Path) -> None:
     head = f"{HEAD},contact_area_corrected,error_friction,error_area"
     rows = "1,1,0.4,0.75,0.5,0.1,0.04", "4,4,0.4,0.75,0.5,0.1,0.04"
     write_table(tmp_path / "measures.csv", head, "0,0,0,1,1,,", *rows)
-    assert list(theory_table.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
+    assert list(info.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
         "Persson's theory predicts mu_max 0.2 (run: 0.400 ± 0.040), mu_dyn 0.2 (run: 0.400 ± 0.040), "
         "contact area 0.25 (run: 0.500 ± 0.020)"
     ]
 
 
 def test_nothing_slides_or_nothing_was_predicted(tmp_path: Path) -> None:
-    assert theory_table.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == []
+    assert info.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == []
     rest = Stage.model_validate({"pressure": 1.0, "duration": 1.0})
     write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0", "1,0,0,0.3")
-    assert theory_table.compare_with_theory(tmp_path, [rest], 1.0) == [("contact area", 0.3, None, math.nan)]
+    assert info.compare_with_theory(tmp_path, [rest], 1.0) == [("contact area", 0.3, None, math.nan)]
 
 
 # -- pull-offs from made-up rows: of pulls by approach and by load, of several, of a contact that holds ---------------
