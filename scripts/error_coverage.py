@@ -40,7 +40,7 @@ import runs
 from coverage_scenes import FINER, Json, Sketch, sketch
 from matplotlib.figure import Figure
 
-from parcontact.effects.adhesion import results
+from parcontact.effects.adhesion import results, section
 from parcontact.errors import InputError, RunError
 from parcontact.job import Job
 from parcontact.job.history import Timeline
@@ -125,7 +125,8 @@ def _march(job: Job) -> Json:
 
     runs.marched(march, note)
     box = job.grid.lx * job.grid.ly
-    return {"rows": rows, "run": properties, "box": box, "tolerance": job.numerics.tolerance}
+    found = {"rows": rows, "run": properties, "box": box, "tolerance": job.numerics.tolerance}
+    return found if job.section("adhesion") is None else {**found, "coarseness": section.cell_over_zone(job)}
 
 
 def _steady(job: Job) -> Json:
@@ -284,7 +285,7 @@ def _pull_off(series: Json) -> tuple[float, float] | None:
     columns = {name: [row[name] for row in series["rows"]] for name in names}
     columns["contact_area"] = [row["counted"] for row in series["rows"]]
     columns["error_area"] = [row["stated"][1] if row["stated"] else math.nan for row in series["rows"]]
-    pulls = results.find(columns)
+    pulls = results.find(columns, coarseness=series["coarseness"])
     if not pulls:
         return None
     pull = pulls[-1]

@@ -1,6 +1,7 @@
 """Elastic bodies that stick, against closed forms of every length of the attraction."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from numpy.typing import NDArray
 
 import parcontact as pc
 from parcontact.door.simulation import Row
-from parcontact.effects.adhesion.results import PullOff, find
+from parcontact.effects.adhesion.results import PullOff, find, swept
 
 ALPHA, AMPLITUDE, WAVELENGTH = 0.3, 5e-6, 1e-3  # of Johnson's wave
 
@@ -44,6 +45,21 @@ def test_pull_off_of_a_sphere(tabor: float, points: int, box: float, exact: floa
     job = sphere(points, box, tabor, {"approach": 0.2 * LENGTH}, ramp(0.2 * LENGTH, -1.2 * LENGTH, 14))
     assert cells_per_zone(job) > 1.9
     assert_allclose(pull_off(job), -exact * np.pi * WORK * RADIUS, rtol=0.01)
+
+
+@pytest.mark.filterwarnings("ignore:adhesion")  # of cells longer than the process zone
+@pytest.mark.parametrize(("points", "most"), [(28, 4.0), (40, 4.0), (64, 8.0)])
+def test_the_error_of_a_pull_off_contains_the_range(points: int, most: float) -> None:
+    """Cells of 2, 1.4 and 0.9 process zones hold the edge of contact, which the area does not show: pull-offs are up to
+    30 % too large. The stated error covers it, and is at most some times as large."""
+    job = sphere(points, 2.6, 3.0, {"approach": 0.1 * LENGTH}, ramp(0.1 * LENGTH, -2.2 * LENGTH, 60))
+    run = pc.Simulation(job)
+    rows, names = list(run.steps()), ("time", "pressure", "max_pressure", "approach", "contact_area", "error_area")
+    table = {name: [getattr(row, name) for row in rows] for name in names}
+    ended: Any = SimpleNamespace(job=run.job, table=table, detached="")
+    found = dict(swept(ended))
+    true = abs(found["pull_off"] - 1.54 * np.pi * WORK * RADIUS)
+    assert true < found["pull_off_error"] < most * true
 
 
 @pytest.mark.parametrize("size", [1.0, 1.3])

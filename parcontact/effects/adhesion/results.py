@@ -6,10 +6,11 @@ by b at the time t after it, the vertex of the parabola through the three points
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
-The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, and of
-PULL_OFF times the median relative mesh error of the contact area up to this row. In tests, spheres were pulled off at
-seven rates with chosen steps, at accuracies from 0.1 to 0.005: all loads differed from runs with 1500 equal steps by
-less than this error without the part of the mesh.
+The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, of
+PULL_OFF times the median relative mesh error of the contact area up to this row, and of ZONE times the fourth power of
+the side of a cell over the length of a process zone: cells of a zone or more hold the edge of contact. In tests,
+spheres were pulled off at seven rates with chosen steps, at accuracies from 0.1 to 0.005: all loads differed from runs
+with 1500 equal steps by less than this error without the part of the mesh.
 
 The pull-off is the lowest load itself if the pull has no later row, if the contact snaps, or if it still holds. The
 difference to the load of the row before then replaces e in the error.
@@ -22,11 +23,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...job import Job
-from ...march.constants import PULL_OFF
+from ...march.constants import PULL_OFF, Fit
 from ...printed import quantity
 from ...results.results import Results
+from .section import cell_over_zone
 
+ZONE = Fit(
+    "pull-off: times a power of the cell over the process zone",
+    0.03,
+    4.0,
+    "tests/scenarios/test_adhesion.py",
+    "1.1 to 5 for spheres with cells of 0.7 to 2.4 zones",
+)
 SOLVER = 0.25  # accuracy: relative error of the load over the tolerance of the solves
 SNAP = 0.5  # accuracy: change of load in a step, over the largest tension, above which no parabola is used
 LEAST_PULL = 1e-9  # rounding: least mean tension over the highest pressure
@@ -51,9 +59,10 @@ class PullOff(NamedTuple):
         return self.between - (SOLVER * tolerance + self.mesh) * self.pressure
 
 
-def find(columns: Columns, detached: bool = False) -> list[PullOff]:
-    """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach` and
-    `contact_area`; `detached` is True if the run ended because its surfaces detached.
+def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> list[PullOff]:
+    """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach`,
+    `contact_area` and `error_area`; `detached` is True if the run ended because its surfaces detached, and `coarseness`
+    is the side of a cell over the length of the process zone.
 
     A pull begins at the smallest separation, or at the last approach before contact is lost; earlier pulls that the
     contact survived do not count. A pull ends when the separation stops growing, as detached surfaces may later attract
@@ -66,17 +75,15 @@ def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     last = len(area) if detached else len(area) - 1  # last row at which a contact may be lost
     pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
-    return [
-        pull._replace(mesh=PULL_OFF.value * _median_to(columns["error_area"], pull.row))
-        for pull in pulls
-        if pull.pressure < least[pull.row]
-    ]
-
-
-def _median_to(values: Sequence[float], row: int) -> float:
-    """Return the median of the values that are known up to a row, NaN without one."""
-    known = [value for value in values[: row + 1] if value == value]
-    return float(np.median(known)) if known else math.nan
+    zone, areas = ZONE.value * coarseness**ZONE.order, np.asarray(columns["error_area"], float)
+    found = []
+    for pull in pulls:
+        if pull.pressure < least[pull.row]:
+            known = areas[: pull.row + 1]
+            known = known[known == known]
+            area = float(np.median(known)) if known.size else math.nan
+            found.append(pull._replace(mesh=PULL_OFF.value * area + zone))
+    return found
 
 
 def _find(time: Values, pressure: Values, approach: Values, last: int, start: int, end: int) -> PullOff:
@@ -106,35 +113,39 @@ def _below(steps: Values, loads: Values) -> float:
     return slope**2 * (before + after) / (4.0 * (falls + rises))
 
 
-def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
+def describe_pull_off(pulls: Sequence[PullOff], columns: Columns, area: float, tolerance: float) -> Iterator[str]:
     """Yield a sentence for each pull-off, and for the largest pull of a contact that holds. `area` is the area of the
     box [m^2], `tolerance` the tolerance of the solves."""
-    pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
-        row, pressure, _, lost, _ = pull
-        time, approach = (columns[name][row] for name in ("time", "approach"))
-        load = f"{quantity(-pressure * area, 'N', 4)} ({quantity(-pressure, 'Pa', 4)})"
+        time, approach = (columns[name][pull.row] for name in ("time", "approach"))
+        load = f"{quantity(-pull.pressure * area, 'N', 4)} ({quantity(-pull.pressure, 'Pa', 4)})"
         where = f"at t = {quantity(time, 's', 4)}, approach {quantity(approach, 'm', 4)}"
-        error = pull.error(tolerance) * area
-        within = "its error is not known" if math.isnan(error) else f"its error is {quantity(error, 'N', 2)}"
-        if lost is None:
+        if pull.lost is None:
             yield f"largest pull so far: {load}, {where}; contact holds"
             continue
+        error = pull.error(tolerance) * area
+        within = "its error is not known" if math.isnan(error) else f"its error is {quantity(error, 'N', 2)}"
         after = "the next load had no equilibrium"
-        if lost < len(columns["time"]):
-            after = f"contact was lost by t = {quantity(columns['time'][lost], 's', 4)}"
+        if pull.lost < len(columns["time"]):
+            after = f"contact was lost by t = {quantity(columns['time'][pull.lost], 's', 4)}"
         yield f"{f'pull-off {number}' if many else 'pull-off'}: {load}, {where}; {within}, and {after}"
 
 
 SWEPT = (("pull_off", "the pull-off force", "N", "pull_off_error"),)  # results of a sweep for its headline
 
 
+def _pulls(run: Results) -> list[PullOff]:
+    """Return the pull-offs of a run; none if its job has no adhesion."""
+    if run.job is None or run.job.section("adhesion") is None:
+        return []
+    return find(run.table, bool(run.detached), cell_over_zone(run.job))
+
+
 def sentences(run: Results) -> Iterator[str]:
     """Yield a sentence for each pull-off, and for the largest pull of a contact that holds."""
-    if run.job is not None:
-        tolerance = run.job.numerics.tolerance
-        yield from describe_pull_off(run.table, _box(run.job), tolerance, bool(run.detached))
+    if run.job is not None and (pulls := _pulls(run)):
+        yield from describe_pull_off(pulls, run.table, run.job.grid.lx * run.job.grid.ly, run.job.numerics.tolerance)
 
 
 said_at_end = sentences  # also at the end of a run
@@ -142,21 +153,18 @@ said_at_end = sentences  # also at the end of a run
 
 def headline(run: Results) -> Iterator[str]:
     """Yield a line with the force of the last pull-off and its error, if a pull-off was found."""
-    lost = [pull for pull in find(run.table, bool(run.detached)) if pull.lost is not None]
-    if lost and run.job is not None:
-        box = _box(run.job)
-        force, within = -lost[-1].pressure * box, lost[-1].error(run.job.numerics.tolerance) * box
-        known = f" ± {quantity(within, 'N', 2)}" if within == within else ""
-        yield f"the pull-off force is {quantity(force, 'N', 4)}{known}"
+    if found := dict(swept(run)):
+        error = found["pull_off_error"]
+        known = f" ± {quantity(error, 'N', 2)}" if error == error else ""
+        yield f"the pull-off force is {quantity(found['pull_off'], 'N', 4)}{known}"
 
 
 def swept(run: Results) -> Iterator[tuple[str, float]]:
     """Yield names and values of a case's last pull-off: force and error [N], approach [m]; none if the contact
     holds."""
-    if run.job is None or run.job.section("adhesion") is None:
-        return
-    if lost := [each for each in find(run.table, bool(run.detached)) if each.lost]:
-        area, pull = _box(run.job), lost[-1]
+    lost = [each for each in _pulls(run) if each.lost is not None]
+    if run.job is not None and lost:
+        area, pull = run.job.grid.lx * run.job.grid.ly, lost[-1]
         yield "pull_off", -pull.pressure * area
         yield "pull_off_error", pull.error(run.job.numerics.tolerance) * area
         yield "pull_off_approach", run.table["approach"][pull.row]
@@ -164,8 +172,4 @@ def swept(run: Results) -> Iterator[tuple[str, float]]:
 
 def telling_row(run: Results) -> Iterator[int]:
     """Yield the row of the last pull-off, which the summary of the run shows."""
-    yield from (pull.row for pull in find(run.table, bool(run.detached))[-1:])
-
-
-def _box(job: Job) -> float:
-    return job.grid.lx * job.grid.ly
+    yield from (pull.row for pull in _pulls(run)[-1:])

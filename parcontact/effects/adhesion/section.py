@@ -106,6 +106,15 @@ def cell_of(grid: Grid) -> float:
     return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)
 
 
+def cell_over_zone(job: Any) -> float:
+    """Return the side of a cell over the length of the process zone, for a job with adhesion; NaN for a body without
+    long-term modulus, whose process zone depends on the rate."""
+    law = adhesion_law(job.section("adhesion"), job.grid, job.material)
+    assert law is not None
+    zone = law.process_zone(modulus_of(job.material))
+    return cell_of(job.grid) / zone if zone else math.nan
+
+
 def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
     """Return the law of a section, None without one; a range `auto` is the smallest that the cells resolve."""
     if section is None:
