@@ -75,7 +75,7 @@ LONG = 1.2  # accuracy: ratio of the sides of a cell up to which it counts as sq
 LONGEST = 4.0  # accuracy: largest ratio of the sides of a cell in the fits
 MOST_CELLS = 400.0  # tuning: most cells per shortest wave
 MULTIPLE = 16  # tuning: divisor of the number of points along a side, for coarser grids to start from
-SAME = 1e-9  # rounding: relative difference below which numbers are the same
+SAME_LENGTH = 1e-9  # rounding: relative difference below which numbers are the same
 
 
 class Guess(NamedTuple):
@@ -133,7 +133,7 @@ def along(way: Vector, length: float, grid: Grid) -> float:
 
 def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
     """Return True if a grid has a wave between the `shortest` and the `longest` wavelength [m]."""
-    least, most = (1 - SAME) / longest, (1 - SAME) / shortest
+    least, most = (1 - SAME_LENGTH) / longest, (1 - SAME_LENGTH) / shortest
     rows = (grid.ny - 1) // 2
     for column in range(min(grid.nx // 2, int(most * grid.lx)) + 1):
         rest = math.sqrt(max(least**2 - (column / grid.lx) ** 2, 0.0))
@@ -145,12 +145,7 @@ def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
 
 def cells_per_wave(accuracy: float) -> int:
     """Return the cells per shortest wave along the sliding that friction needs for an `accuracy`."""
-    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME)))
-
-
-def cells_across(accuracy: float) -> float:
-    """Return the cells per shortest wave across the sliding that friction needs for an `accuracy`."""
-    return max(LEAST_CELLS, 4.0 * (FRICTION_ASIDE / accuracy) ** (1.0 / FRICTION_ASIDE_ORDER))
+    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME_LENGTH)))
 
 
 def cells_for_area(accuracy: float) -> float:
@@ -165,8 +160,8 @@ def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[fl
         return cells_for_area(asked.area), cells_for_area(asked.area)
     if any(abs(way[axis]) > ASIDE for way in directions):
         return cells_per_wave(asked.friction), cells_for_area(asked.area)
-    for_area = max(LEAST_CELLS, 4.0 * (AREA_ASIDE / asked.area) ** (1.0 / AREA_ASIDE_ORDER))
-    return cells_across(asked.friction), for_area
+    for_friction = max(LEAST_CELLS, 4.0 * (FRICTION_ASIDE / asked.friction) ** (1.0 / FRICTION_ASIDE_ORDER))
+    return for_friction, max(LEAST_CELLS, 4.0 * (AREA_ASIDE / asked.area) ** (1.0 / AREA_ASIDE_ORDER))
 
 
 def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
@@ -191,7 +186,7 @@ def more_points(grid: Grid) -> str:
 
 def fast_length(least: float) -> int:
     """Return the smallest multiple of MULTIPLE, at least `least`, whose other prime factors are 2, 3 and 5."""
-    count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME)))
+    count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME_LENGTH)))
     while 60 ** count.bit_length() % count:  # 60 = 2 * 2 * 3 * 5
         count += 1
     return MULTIPLE * count
@@ -233,7 +228,6 @@ def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, g
 LONG_WAVES = 4  # accuracy: least number of longest waves along the box for a representative surface (paper, section 3)
 MOST_LONG_WAVES = 500  # tuning: number of longest waves along the box above which its unit is doubted
 STEPS_PER_WAVE = 4  # accuracy: least time steps per shortest wave while sliding
-SAME_LENGTH = 1e-9  # rounding: relative difference below which lengths are the same
 LITTLE = 0.05  # tuning: relative lack of points that gets no warning
 
 # fitted: relative standard deviation over seeds, times longest waves along a side (`scripts/chosen_mesh.py`); 0.1 to
@@ -249,7 +243,8 @@ def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:
             yield from _long_waves(index, shape, grid)
             yield from doubt_size(index, shape, grid)
             if not job.origin.mesh:
-                yield from _short_waves(index, shape, grid, numerics.asked, job.directions)
+                found = _few_cells(shape.short_wavelength, grid, numerics.asked, job.directions)
+                yield from (WARN_FEW_CELLS(f"surface.{index}", numbers) for numbers in found)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
     times = [branch.relaxation_time for branch in job.material.fitted.branches]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
@@ -298,13 +293,6 @@ WARN_FEW_CELLS = Kind(
     "only {cells:.3g} cells per shortest wave along {axis}; {reason} needs {needed:.3g}: use {points} points "
     "({memory:.2g} times the memory{time}) or a short_wavelength of {wave:.4g} m",
 )
-
-
-def _short_waves(
-    index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
-) -> Iterator[Doubt]:
-    for numbers in _few_cells(shape.short_wavelength, grid, asked, directions):
-        yield WARN_FEW_CELLS(f"surface.{index}", numbers)
 
 
 WARN_FEW_CELLS_OF_A_MAP = Kind(

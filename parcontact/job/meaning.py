@@ -151,22 +151,19 @@ WARN_STRAIN_AT_ONCE = Kind(
 )
 
 
-def _bearing_share(job: Sections) -> float:
-    """Return the share of the box that bears the load: the face of a single punch, whose edge may be as steep as the
-    edge of the sharp punch in linear theory; else 1."""
-    grid, punch = job.grid, job.surface[0]
-    if len(job.surface) > 1 or not isinstance(punch, Punch) or grid.ny == 1:
-        return 1.0
-    return min(1.0, math.pi * punch.radius**2 / (grid.lx * grid.ly))
-
-
 def _pressures(job: Sections) -> Iterator[Doubt]:
-    material, share = job.material.fitted, _bearing_share(job)
+    """Yield warnings about large strains and about a load that hardly touches.
+
+    A single punch bears the load on its face: its edge may be as steep as that of the sharp punch in linear theory.
+    """
+    material, grid, punch, share = job.material.fitted, job.grid, job.surface[0], 1.0
+    if len(job.surface) == 1 and isinstance(punch, Punch) and grid.ny > 1:
+        share = min(1.0, math.pi * punch.radius**2 / (grid.lx * grid.ly))
     loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
     loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
     for index, stage in enumerate(job.history):
-        ends = [_mean(stage, load, job.grid) for load in (stage.load.lowest, stage.load.highest)]
+        ends = [_mean(stage, load, grid) for load in (stage.load.lowest, stage.load.highest)]
         least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
         loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
     found = [
@@ -174,10 +171,8 @@ def _pressures(job: Sections) -> Iterator[Doubt]:
     ]
     strain, key, pressure, seconds = max(found)
     if strain > STRAIN:
-        kind, where = (
-            WARN_STRAIN_IN_TIME if seconds else WARN_STRAIN_AT_ONCE,
-            " on the face of the punch" * (share < 1.0),
-        )
+        kind = WARN_STRAIN_IN_TIME if seconds else WARN_STRAIN_AT_ONCE
+        where = " on the face of the punch" * (share < 1.0)
         yield kind(key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds, "where": where})
     yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
 
@@ -207,12 +202,17 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
     The bound is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t with rising creep compliance J, so
     J(t) >= t/int_0^t E*.
     """
-    modulus = material.instant_modulus
+    return _contact_modulus(material, seconds, lambda ratio: -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0)
+
+
+def _contact_modulus(material: Elastic | Zener, seconds: float, kept: Callable[[float], float]) -> float:
+    """Return E* [Pa] after `seconds`; `kept` is the share of a branch that is left after a time over its relaxation
+    time."""
+    modulus = material.long_modulus
     for branch in material.branches:
         ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
-        kept = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
-        modulus -= material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
-    return 2.0 * max(modulus, material.long_modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
+        modulus += material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * kept(ratio)
+    return 2.0 * max(modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
 
 
 # -- relaxation -------------------------------------------------------------------------------------------------------
@@ -324,9 +324,12 @@ def _room(job: Sections) -> Iterator[Doubt]:
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
             yield WARN_LARGE_CONTACT(f"history.{index}", {"contact": radius, "radius": sphere.radius})
-        radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
+        # under a constant load 1/E*(t) bounds the creep compliance from above, and with it the contact
+        relaxed = _contact_modulus(material, elapsed, lambda ratio: math.exp(-ratio))
+        radius = _hertz(stage, sphere.radius, relaxed, grid)
         room = min(x, grid.lx - x, y, grid.ly - y)
-        way, length = _way_to_edge((x, y), stage, radius, grid.size), stage.speed * _longest_motion(stage)
+        farthest = 0.25 / stage.velocity.frequency if isinstance(stage.velocity, Swing) else stage.seconds
+        way, length = _way_to_edge((x, y), stage, radius, grid.size), stage.speed * stage.moving(farthest)
         if radius > 0.0 and (radius > room or way < length) and "room" not in found:
             found.add("room")
             numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "room": max(room, 0.0), "way": way}
@@ -334,11 +337,6 @@ def _room(job: Sections) -> Iterator[Doubt]:
             yield kind(f"history.{index}", {**numbers, "length": length})
         moving = stage.moving(stage.seconds)
         x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
-
-
-def _longest_motion(stage: Stage) -> float:
-    """Return the time [s] in which the velocity, as a constant one, leads to the farthest position of a stage."""
-    return stage.moving(0.25 / stage.velocity.frequency if isinstance(stage.velocity, Swing) else stage.seconds)
 
 
 def _way_to_edge(start: tuple[float, float], stage: Stage, radius: float, size: tuple[float, float]) -> float:
@@ -354,35 +352,20 @@ def _way_to_edge(start: tuple[float, float], stage: Stage, radius: float, size: 
     return min(ways)
 
 
-def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float:
-    """Return E*(t) [Pa] after `seconds` of relaxation. Under a constant load 1/E*(t) bounds the creep compliance from
-    above, and with it the contact."""
-    modulus = material.long_modulus
-    for branch in material.branches:
-        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
-        modulus += material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * math.exp(-ratio)
-    return 2.0 * max(modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
-
-
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
     """Return the contact radius [m] by Hertz (1882) for a contact modulus [Pa], at the end of a stage or at the highest
     load of an oscillation."""
+    load = max(stage.load.highest if stage.frequency else stage.load.end, 0.0)
     if stage.control == "approach":
-        return math.sqrt(max(_final(stage), 0.0) * radius)
-    force = _mean(stage, _final(stage), grid) * grid.lx * grid.ly
-    return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
-
-
-def _final(stage: Stage) -> float:
-    """Return the load at the end of a stage, or the highest load of an oscillation."""
-    return stage.load.highest if stage.frequency else stage.load.end
+        return math.sqrt(load * radius)
+    return float((0.75 * _mean(stage, load, grid) * grid.lx * grid.ly * radius / modulus) ** (1 / 3))
 
 
 def neighbours(job: Sections) -> Iterator[Doubt]:
     """Yield a warning if the images of a single sphere in a periodic box change its load."""
-    modulus = instant_contact_modulus(job.material.fitted)
-    return acting_neighbours(
-        job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
+    modulus, grid = instant_contact_modulus(job.material.fitted), job.grid
+    yield from acting_neighbours(
+        job, lambda radius: max((_hertz(stage, radius, modulus, grid) for stage in job.history), default=0.0)
     )
 
 
@@ -468,10 +451,8 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
     velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
     speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
     turns = [stage.frequency for stage in job.history if stage.frequency]
-    moving, waves = (
-        [speed for speed in speeds if speed > 0.0],
-        [number for shape in job.surface for number in wave_numbers(shape, job.grid)],
-    )
+    moving = [speed for speed in speeds if speed > 0.0]
+    waves = [number for shape in job.surface for number in wave_numbers(shape, job.grid)]
     if moving and waves:
         turns += [min(moving) * min(waves) / (2 * math.pi), max(moving) * max(waves) / (2 * math.pi)]
     return (min(turns), max(turns)) if turns else None
