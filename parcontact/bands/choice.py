@@ -24,10 +24,11 @@ from ..doubts import Doubt, Kind
 from ..errors import InputError
 from ..job import Grid, Job, Topography, map_files, measured_maps
 from ..job.advice import fast_length
-from ..job.calculation import AUTO, LEAST_CELLS, Bands
+from ..job.calculation import LEAST_CELLS, Bands
 from ..job.limits import doubt_memory
 from ..job.listing import answers
 from ..job.measured_maps import prepare
+from ..job.parts import AUTO
 from ..march import map_sentences
 from ..march.measured_range import doubt_band
 from ..parallel.slab import Array

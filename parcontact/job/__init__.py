@@ -4,9 +4,9 @@ from ..errors import JobError
 from .calculation import Checkpoint, Grid, Numerics, Output, Study
 from .materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe_job
-from .parts import Part, Positive, log_range
+from .parts import AUTO, Part, Positive, log_range
 from .reading import Case, load, load_cases, select_cases
-from .stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady, Swing
+from .stages import GeometricStep, Initial, Ramp, Stage, Steady, Swing
 from .surfaces import (
     Cone,
     Cylinder,

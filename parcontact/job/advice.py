@@ -28,8 +28,8 @@ from ..doubts import Doubt, Kind
 from ..printed import per_cent
 from .calculation import Accuracy, Grid, Numerics, Output
 from .materials import AnyMaterial
-from .parts import Origin
-from .stages import AUTO, GeometricStep, Initial, Stage, Steady
+from .parts import AUTO, Origin
+from .stages import GeometricStep, Initial, Stage, Steady
 from .surfaces import Rough
 
 

@@ -14,8 +14,9 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, Pri
 
 from ..capabilities import stated
 from .parts import (
-    AUTO_POINTS,
+    AUTO,
     FROM_SURFACE,
+    Auto,
     Count,
     Flag,
     Fraction,
@@ -47,8 +48,7 @@ def _different(name: str) -> Rule:
     def check(values: tuple[Any, ...]) -> Iterator[Fault]:
         for index, value in enumerate(values):
             if value is not None and value in values[:index]:
-                shown = value if name == "fields" else repr(value)
-                yield Fault(f"repeats {shown}", (name, index))
+                yield Fault(f"repeats {value if name == 'fields' else repr(value)}", (name, index))
 
     return Rule((name,), check)
 
@@ -71,7 +71,7 @@ Boundary = Literal["periodic", "free"] | tuple[Literal["periodic"], Literal["fre
 class Grid(Part):
     """The box and its cells; x comes first in `points` and `size`."""
 
-    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE, AUTO_POINTS] = Field(
+    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE, AUTO] = Field(
         description="a positive whole number of points"
     )
     size: Annotated[tuple[Positive, Positive], BeforeValidator(both), FROM_SURFACE] = Field(
@@ -263,8 +263,6 @@ class Study(Part):
     rules = (*map(_different, LADDERS), Rule(LADDERS, _some_ladder))
 
 
-Auto = Literal["auto"]
-AUTO: Auto = "auto"
 LEAST_WAVES = 2  # longest waves along a box whose cells of wavenumbers do not reach 0
 LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
 
@@ -306,15 +304,14 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
     if bands is None or not history or None in history:
         return
     load = "must be the same pressure in all stages of a job in bands, whose bands are marched at fixed pressures"
+    no_pressure = "cannot be used with bands, which have boxes of their own: give a pressure"
     for index, stage in enumerate(history):
         place = ("history", index)
         if stage.frequency:
             yield Fault("cannot oscillate in a job in bands, which are marched through slides and rests", place)
             continue
         if stage.control != "pressure":
-            yield Fault(
-                "cannot be used with bands, which have boxes of their own: give a pressure", (*place, stage.control)
-            )
+            yield Fault(no_pressure, (*place, stage.control))
         elif not stage.load.constant or stage.load.start != (history[0].pressure or stage.load).start:
             yield Fault(load, (*place, "pressure"))
         elif not stage.load.start > 0.0:

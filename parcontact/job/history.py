@@ -19,7 +19,8 @@ from typing import Any, NamedTuple, Protocol
 from .advice import one_cell
 from .calculation import Grid, Numerics
 from .limits import estimate_steps, first_step
-from .stages import AUTO, PARTS_OF_CYCLE, GeometricStep, Initial, Stage
+from .parts import AUTO
+from .stages import PARTS_OF_CYCLE, GeometricStep, Initial, Stage
 from .surfaces import Flat, Indenter, Rough, Wave
 
 SAME_TIME = 1e-9  # accuracy: relative deviation of a duration from a whole number of steps that is ignored
@@ -290,7 +291,7 @@ def divide(stage: Stage, grid: Grid) -> GivenEnds:
         return GivenEnds(stage.cycles * _steps_of_cycle(stage, grid), 1.0, stage.seconds)
     if stage.time_step == AUTO and not stage.constant and not stage.speed:
         return GivenEnds(RAMP_STEPS, 1.0, stage.seconds)
-    steps = estimate_steps(stage, stage.seconds, first_step(stage, grid))
+    steps = estimate_steps(stage, grid)
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return GivenEnds(max(1, math.ceil(steps * (1.0 - SAME_TIME))), growth, stage.seconds)
 

@@ -20,8 +20,8 @@ from ..errors import InputError
 from .advice import SAME_LENGTH, Sections, doubt_size, has_wave, one_cell
 from .calculation import FIELDS_NEED, Grid, Numerics, Output, Study
 from .materials import AnyMaterial, heated
-from .parts import Rule, rules_of
-from .stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
+from .parts import AUTO, Rule, rules_of
+from .stages import FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
 from .surfaces import SAME_CELL, Flat, HeightArray, OnOneMesh, Rough, RoughSpectrum, Topography
 from .yaml_text import Fault
 
@@ -41,8 +41,13 @@ def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
         yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
 
+def steady_sections(initial: Initial, steady: Steady | None) -> list[str]:
+    """Return the sections of a job that ask for steady sliding."""
+    return ["initial"] * (initial.state == "steady") + ["steady"] * (steady is not None)
+
+
 def no_steady_strip(grid: Grid, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-    if steady is not None or initial.state == "steady":
+    if steady_sections(initial, steady):
         yield from no_strip("steady sliding", grid)
 
 
@@ -157,21 +162,16 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
-        least = stage.load.lowest
-        if least < 0.0:
-            ends = _place_of_lowest(stage)
-            got = f"must be {LOADS[stage.control]}, got {least:g}"
-            if isinstance(stage.load, Oscillation):
-                got = f"must be at most the mean, {stage.load.mean:g}, got {stage.load.amplitude:g}"
-            sentence = f"{got}; pulling needs adhesion"
-            yield Fault(sentence, ("history", index, stage.control, *ends))
-
-
-def _place_of_lowest(stage: Stage) -> tuple[str, ...]:
-    """Return the key of the lowest load within the load of a stage."""
-    if isinstance(stage.load, Oscillation):
-        return ("amplitude",)
-    return () if stage.load.constant else ("from" if stage.load.start == stage.load.lowest else "to",)
+        load, place = stage.load, ("history", index, stage.control)
+        if load.lowest >= 0.0:
+            continue
+        if isinstance(load, Oscillation):
+            got = f"must be at most the mean, {load.mean:g}, got {load.amplitude:g}"
+            place = (*place, "amplitude")
+        else:
+            got = f"must be {LOADS[stage.control]}, got {load.lowest:g}"
+            place = place if load.constant else (*place, "from" if load.start == load.lowest else "to")
+        yield Fault(f"{got}; pulling needs adhesion", place)
 
 
 def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
@@ -202,9 +202,8 @@ def refuse_flow(
     """Yield an error for steady sliding of a body without long-term modulus, except on a `line` of points (nx, ny)."""
     if material.fitted.long_modulus > 0.0:
         return
-    asked = [("initial", initial.velocity)] if initial.state == "steady" else []
-    asked += [("steady", steady.unit_direction)] if steady is not None else []
-    for key, velocity in asked:
+    for key in steady_sections(initial, steady):
+        velocity = initial.velocity if key == "initial" or steady is None else steady.unit_direction
         if not any(n > 1 and part != 0.0 for n, part in zip(line, velocity, strict=False)):
             sentence = "needs a material with a long-term modulus: this one flows as long as it is pressed"
             yield Fault(f"{sentence}; give it modulus_inf > 0, or slide in a stage of the history", (key,))
@@ -251,9 +250,8 @@ def loads_are_borne(
     if bands is not None:
         yield Fault("cannot be used with bands: their closing has no largest pressure", ("material", "hardness"))
         return
-    for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
-        if given:
-            yield Fault("cannot be used with material.hardness: slide into the steady state with a stage", (key,))
+    for key in steady_sections(initial, steady):
+        yield Fault("cannot be used with material.hardness: slide into the steady state with a stage", (key,))
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
@@ -267,10 +265,9 @@ def refuse_steady(section: str) -> Rule:
     """Return the rule that excludes steady sliding with a section whose effect has its own contact law."""
 
     def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-        for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
-            if given is not None and asked:
-                sentence = f"cannot be used with {section}: slide into the steady state with a stage of the history"
-                yield Fault(sentence, (key,))
+        for key in steady_sections(initial, steady) if given is not None else ():
+            sentence = f"cannot be used with {section}: slide into the steady state with a stage of the history"
+            yield Fault(sentence, (key,))
 
     return Rule((section, "initial", "steady"), check)
 
@@ -294,8 +291,7 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
     for index, stage in enumerate(history):
         if stage is None:
             return
-        if stage.seconds:
-            total += estimate_steps(stage, stage.seconds, first_step(stage, grid))
+        total += estimate_steps(stage, grid)
         if total > MOST_STEPS:
             key = "cells_per_step" if stage.cells_per_step is not None else "time_step"
             yield Fault(f"leads to {total:.3g} steps; a history has at most {MOST_STEPS:.0e}", ("history", index, key))
@@ -304,8 +300,7 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
 
 def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
     """Return the estimated number of steps of a history, without instantaneous stages."""
-    lasting = [stage for stage in history if stage.seconds]
-    return math.ceil(sum(estimate_steps(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
+    return math.ceil(sum(estimate_steps(stage, grid) for stage in history))
 
 
 def first_step(stage: Stage, grid: Grid) -> float:
@@ -319,9 +314,12 @@ def first_step(stage: Stage, grid: Grid) -> float:
     return stage.time_step or 0.0
 
 
-def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
-    """Return the estimated number of steps of a stage of `seconds` whose first step is `first` [s]."""
-    count = seconds / first if first else math.inf
+def estimate_steps(stage: Stage, grid: Grid) -> float:
+    """Return the estimated number of steps of a stage, 0 for an instantaneous one."""
+    if not stage.seconds:
+        return 0.0
+    first = first_step(stage, grid)
+    count = stage.seconds / first if first else math.inf
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return count if growth == 1.0 else min(count, math.log1p(count * (growth - 1.0)) / math.log(growth))
 

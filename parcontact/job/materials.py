@@ -146,10 +146,8 @@ def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault
         yield Fault(f"is outside of the shift: {error}", ("temperature",))
         return
     if not abs(log) <= LARGEST_SHIFT:
-        sentence = (
-            f"would change the relaxation times by a factor of 10^{log:.3g}; the limits are 10^-{LARGEST_SHIFT:g} and "
-        )
-        yield Fault(f"{sentence}10^{LARGEST_SHIFT:g}", ("temperature",))
+        limits = f"the limits are 10^-{LARGEST_SHIFT:g} and 10^{LARGEST_SHIFT:g}"
+        yield Fault(f"would change the relaxation times by a factor of 10^{log:.3g}; {limits}", ("temperature",))
 
 
 # -- bodies ------------------------------------------------------------------------------------------------------------
@@ -261,21 +259,28 @@ class Elastic(Part):
     long_modulus = instant_modulus
 
 
-def _positive_band(band: tuple[float, float]) -> tuple[float, float]:
-    if band[0] >= band[1]:
+def _rising_band(band: tuple[float, float] | None) -> tuple[float, float] | None:
+    if band and band[0] >= band[1]:
         refuse(Fault(f"must be a lower and a higher frequency [Hz], got {list(band)!r}"))
     return band
 
 
+def _ordered(degrees: tuple[float, float] | None) -> tuple[float, float] | None:
+    if degrees and degrees[0] > degrees[1]:
+        refuse(Fault(f"must be the lowest and the highest temperature [deg C], got {list(degrees)!r}"))
+    return degrees
+
+
 Band = Annotated[
     tuple[Positive, Positive] | None,
-    AfterValidator(lambda band: band and _positive_band(band)),
+    AfterValidator(_rising_band),
     Field(description="two frequencies [Hz], the measured band reduced to the reference temperature"),
 ]
 
 
 Measured = Annotated[
     tuple[Celsius, Celsius] | None,
+    AfterValidator(_ordered),
     Field(description="two temperatures [deg C], the lowest and the highest that were measured"),
 ]
 

@@ -16,7 +16,7 @@ from contextlib import suppress
 from inspect import signature
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -282,7 +282,8 @@ def chosen(
 # -- types of values -------------------------------------------------------------------------------------------------
 
 FROM_SURFACE = "from surface"  # grid.points or grid.size: as the measured map
-AUTO_POINTS = "auto"  # grid.points: chosen by the accuracy
+Auto = Literal["auto"]
+AUTO: Auto = "auto"  # chosen by numerics.accuracy
 MOST = 2**31 - 1  # largest whole number: transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-60, 1e60  # rounding: range of numbers in a job, whose squares and quotients do not overflow
 LOWEST, HIGHEST = -273.15, 5000.0  # physics: range of temperatures [deg C]

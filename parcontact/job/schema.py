@@ -23,7 +23,7 @@ from . import listing
 from .materials import Dma, Elastic, Zener
 from .model import Job, extended_model
 from .parts import (
-    AUTO_POINTS,
+    AUTO,
     FROM_SURFACE,
     LARGEST,
     MOST,
@@ -67,7 +67,7 @@ class SchemaOfKeys(GenerateJsonSchema):
             return found
         array = next(one for one in found.get("anyOf", [found]) if one.get("type") == "array")
         one_value = array["items"] if "items" in array else array["prefixItems"][0]
-        words = [FROM_SURFACE, *([AUTO_POINTS] if one_value.get("type") == "integer" else [])]
+        words = [FROM_SURFACE, *([AUTO] if one_value.get("type") == "integer" else [])]
         ranges = [RANGE] if function is expand_range else [{"enum": words}] if function is both else []
         return {"anyOf": [one_value, array, *ranges]}
 

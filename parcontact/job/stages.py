@@ -23,6 +23,8 @@ from pydantic import (
 
 from .. import capabilities
 from .parts import (
+    AUTO,
+    Auto,
     Celsius,
     Count,
     Flag,
@@ -37,6 +39,7 @@ from .parts import (
     listed,
     log_range,
     rules_of,
+    unit_in,
 )
 from .yaml_text import Fault, quote, refuse
 
@@ -128,10 +131,8 @@ OR_SWING = WrapValidator(_swing, json_schema_input_type=Vector | SwingKeys)  # o
 
 def check_cycles(cycles: int | None, velocity: tuple[float, float], *loads: Any) -> Iterator[Fault]:
     """Yield errors unless a stage oscillates in one quantity at most, and has cycles exactly if it oscillates."""
-    names = ("velocity", "pressure", "force", "approach")
-    found = [
-        name for name, value in zip(names, (velocity, *loads), strict=True) if isinstance(value, Swing | Oscillation)
-    ]
+    given = zip(("velocity", *CONTROLS), (velocity, *loads), strict=True)
+    found = [name for name, value in given if isinstance(value, Swing | Oscillation)]
     if len(found) > 1:
         yield Fault(f"oscillates, and so does the {found[1]}: one of them may", (found[0],))
     if found and cycles is None:
@@ -151,7 +152,6 @@ VELOCITY = "a velocity [m/s]: a number along x, or [vx, vy]"
 SLIDES = (1.0, 0.0)  # physics: creep of a surface that slides without rolling
 SIGNED = ", with adhesion also below zero"
 APPROACH = "a finite approach [m]"
-UNITS = {PRESSURE: "Pa", FORCE: "N", APPROACH: "m"}
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
 
 
@@ -210,7 +210,7 @@ def _load(number: Any, description: str, **more: Any) -> PlainValidator:
     `Oscillation` of {mean, amplitude, frequency}."""
     end: Any = (number, Field(description=description))
     keys = create_model("Ends", __base__=Part, **{"from": end, "to": end}, **more)
-    size: Any = (Positive, Field(description=f"a positive amplitude [{UNITS[description]}]"))
+    size: Any = (Positive, Field(description=f"a positive amplitude [{unit_in(description)}]"))
     turns = create_model("Oscillating", __base__=Part, mean=end, amplitude=size, frequency=FREQUENCY)
 
     def read(value: Any, info: ValidationInfo) -> Ramp | Oscillation:
@@ -238,10 +238,6 @@ class GeometricStep(Part):
 
     first: Positive = Field(description="a positive time step [s]")
     growth: Real = Field(ge=1, description="a factor [-] of one or more")
-
-
-Auto = Literal["auto"]
-AUTO: Auto = "auto"  # time steps chosen by numerics.accuracy
 
 
 def _time_step(value: Any, info: ValidationInfo) -> float | GeometricStep | Auto:
@@ -282,8 +278,8 @@ def _lasting_ramp(
     duration: float | None, distance: float | None, cycles: int | None, *loads: Load | None
 ) -> Iterator[Fault]:
     """Check that each ramp has one duration: from a key of the stage, or from the velocity of the approach."""
-    lasts = {"duration": duration, "distance": distance, "cycles": cycles}
-    given = [key for key, value in lasts.items() if value is not None]
+    lasts = zip(LASTS, (duration, distance, cycles), strict=True)
+    given = [key for key, value in lasts if value is not None]
     for name, ramp in zip(CONTROLS, loads, strict=True):
         if not isinstance(ramp, Ramp):
             continue
@@ -292,8 +288,7 @@ def _lasting_ramp(
             yield Fault(sentence, (name, "velocity"))
         if not ramp.constant and not ramp.velocity and not given:
             normal = ", or a velocity [m/s] in its braces" if name == "approach" else ""
-            needs = f"needs a duration [s] or a distance [m]{normal}"
-            yield Fault(f"is a ramp, which {needs}", (name,))
+            yield Fault(f"is a ramp, which needs a duration [s] or a distance [m]{normal}", (name,))
 
 
 WHICH_LOAD = "give a pressure [Pa], a force [N] or an approach [m]"

@@ -36,7 +36,7 @@ from ..job.calculation import Accuracy, Grid, Numerics
 from ..job.listing import plain_data
 from ..job.materials import AnyMaterial, Material
 from ..job.model import prepared
-from ..job.parts import AUTO_POINTS, FROM_SURFACE, Origin, Part
+from ..job.parts import AUTO, FROM_SURFACE, Origin, Part
 from ..job.stages import Initial, Stage, Steady
 from ..job.surfaces import OnOneMesh, Rough, RoughSpectrum, Shape, Spectral, Topography, Wave
 from ..job.yaml_text import UNREADABLE, Source, is_array
@@ -173,7 +173,7 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
     """Replace `points: auto` in the source of a job. Return the origin with a sentence. Errors are mistakes at this
     key; mistakes in other sections are found when the job is validated."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
-    if not isinstance(grid, dict) or grid.get("points") != AUTO_POINTS:
+    if not isinstance(grid, dict) or grid.get("points") != AUTO:
         return origin
     known = prepared({name: source.data[name] for name in Scenery.model_fields if source.data.get(name) is not None})
     points: Any = UNREADABLE
@@ -183,7 +183,7 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
         points, said = _choose(scenery, box, source.data, origin)
         origin = origin._replace(mesh=said)
     except InputError as error:
-        source.note(source.locate(("grid", "points")).place, f"grid.points: {AUTO_POINTS}: {error}")
+        source.note(source.locate(("grid", "points")).place, f"grid.points: {AUTO}: {error}")
     except ValidationError:
         pass
     grid["points"] = points

@@ -184,6 +184,10 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
             "must be at least two rising temperatures",
         ),
         ("{model: zener, modulus_inf: 1.0e6, band: [10, 1]}", "must be a lower and a higher frequency"),
+        (
+            "{model: zener, modulus_inf: 1.0e6, temperatures: [80, 20]}",
+            "must be the lowest and the highest temperature",
+        ),
     ],
 )
 def test_mistakes_in_a_job(tmp_path: Path, material: str, sentence: str) -> None:
