@@ -54,10 +54,11 @@ def plain_data(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """Return the keys of a part that have a value, with their values, where parts are as the job gives them."""
+    """Yield the keys of a part that have a value, with their values, where parts are as the job gives them."""
     names = (name for name in type(part).model_fields if name not in part.left_out())
-    found = ((name, value) for name in names if (value := getattr(part, name)) is not None)
-    return ((name, value.given if isinstance(value, Part) else value) for name, value in found)
+    for name in names:
+        if (value := getattr(part, name)) is not None:
+            yield name, value.given if isinstance(value, Part) else value
 
 
 def plain_job(job: Any) -> dict[str, Any]:
@@ -180,7 +181,7 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
     for section in found:
         if reason := why_unusable(section):
             refuse(Fault(reason, (section,), at_key=True))
-    ours = {each.SECTION: each for each in capabilities.folders() if hasattr(each, "SECTION")}
+    ours = _folders()
     needs = {section: capabilities.needs_of(ours.get(section) or _load(section)) for section in found}
     return {section: _load(section) for section in capabilities.in_order(needs)}
 
@@ -232,22 +233,20 @@ def unusable() -> list[str]:
 
 @cache
 def _registered() -> dict[str, EntryPoint]:
-    others = {entry.name: entry for entry in entry_points(group=GROUP) if not _is_ours(entry)}
-    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders() if hasattr(each, "SECTION")}
+    """Return the effects of other packages and, also if another package takes the same name, those of this package."""
+    return {entry.name: entry for entry in entry_points(group=GROUP)} | {
+        name: EntryPoint(name, f"{each.__name__}.effect:{each.EFFECT}", GROUP) for name, each in _folders().items()
+    }
 
 
-def _entry_of(folder: ModuleType) -> EntryPoint:
-    return EntryPoint(folder.SECTION, f"{folder.__name__}.effect:{folder.EFFECT}", GROUP)
-
-
-def _is_ours(entry: EntryPoint) -> bool:
-    """Return True for an effect of this package."""
-    return entry.value.startswith(f"{__package__.partition('.')[0]}.")
+def _folders() -> dict[str, ModuleType]:
+    """Return the packages of this package's effects by section."""
+    return {each.SECTION: each for each in capabilities.folders() if hasattr(each, "SECTION")}
 
 
 def own_sections() -> list[str]:
     """Return the sections that effects of this package add."""
-    return sorted(name for name, entry in _registered().items() if _is_ours(entry))
+    return sorted(_folders())
 
 
 @cache
@@ -262,13 +261,10 @@ def why_unusable(section: str) -> str:
         effect = _load(section)
         base = f"{Part.__module__}.{Part.__name__}"
         reason = "" if issubclass(effect.section, Part) else f"its section is not a subclass of {base}"
-        if not _are_names(effect.columns):
-            reason = f"its columns must be a tuple of different names, of letters, digits and _, got {effect.columns!r}"
+        columns = effect.columns
+        different = isinstance(columns, tuple | list) and len(set(columns)) == len(columns)
+        if not different or not all(isinstance(name, str) and name.isidentifier() for name in columns):
+            reason = f"its columns must be a tuple of different names, of letters, digits and _, got {columns!r}"
     except (Exception, SystemExit) as error:  # code of other packages may raise anything
         reason = f"{type(error).__name__}: {error}"
     return reason and f"belongs to the effect {_registered()[section].value}, which cannot be used: {reason}"
-
-
-def _are_names(columns: Any) -> bool:
-    kind = isinstance(columns, tuple | list) and len(set(columns)) == len(columns)
-    return kind and all(isinstance(name, str) and name.isidentifier() for name in columns)

@@ -179,9 +179,8 @@ def read_job(path: Path, changes: Iterable[Change], case: int = 0, given: Source
     """
     source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]
-    for override in overrides:
-        if override.path[:1] == SWEEP:
-            _apply(source, override)
+    for override in (one for one in overrides if one.path[:1] == SWEEP):
+        _apply(source, override)
     sweep = take_sweep(source)
     overrides = [override for override in overrides if override.path[:1] != SWEEP]
     if sweep is None:
@@ -191,13 +190,11 @@ def read_job(path: Path, changes: Iterable[Change], case: int = 0, given: Source
         overrides += sweep.case(min(max(case, 0), len(sweep) - 1))
     owns = {name: dict(_material(source, name)) for name in materials()}
     first = [key for name in owns for key in ((name,), (name, "include"))]
-    for override in overrides:
-        if override.path in first:
-            _apply(source, override)
+    for override in (one for one in overrides if one.path in first):
+        _apply(source, override)
     included = [_include(source, path, name, {} if "include" in own else own) for name, own in owns.items()]
-    for override in overrides:
-        if override.path not in first:
-            _apply(source, override)
+    for override in (one for one in overrides if one.path not in first):
+        _apply(source, override)
     return Reading(source, tuple(filter(None, included)), sweep)
 
 
@@ -451,18 +448,13 @@ def _read(
     except ValidationError as error:
         return None, [*source.mistakes, *_mistakes(source, error)], sweep
     if job.numerics.strict:
-        places = [NOWHERE if from_python else _locate(source, doubt.place) for doubt in job.doubts]
-        doubts = zip(places, job.doubts, strict=True)
-        source.mistakes += [Mistake(place, f"{doubt} ({STRICT})") for place, doubt in doubts]
+        for doubt in job.doubts:
+            key = tuple(int(step) if step.isdigit() else step for step in (doubt.place or "numerics.strict").split("."))
+            place = NOWHERE if from_python else source.locate(key).place
+            source.mistakes.append(Mistake(place, f"{doubt} ({STRICT})"))
     if source.mistakes:
         return None, source.mistakes, sweep
     return _case(job, index, sweep), [], sweep
-
-
-def _locate(source: Source, key: str) -> Place:
-    """Return the place of a key such as `surface.0.amplitude`, or of `numerics.strict` without a key."""
-    steps = tuple(int(step) if step.isdigit() else step for step in key.split("."))
-    return source.locate(steps if key else ("numerics", "strict")).place
 
 
 def _refuse_no_job(given: Any, overrides: Any) -> None:
@@ -472,9 +464,8 @@ def _refuse_no_job(given: Any, overrides: Any) -> None:
     if not isinstance(overrides, Sequence | Mapping) or isinstance(overrides, str):
         raise JobError([f"set must be a mapping of keys and values, got {shorten(repr(overrides), 60)}"])
     if wrong := [key for key in overrides if not isinstance(key, str)]:
-        raise JobError(
-            [f"set has a key that is not a text, {shorten(repr(wrong[0]), 60)}; use keys like 'grid.points'"]
-        )
+        key = shorten(repr(wrong[0]), 60)
+        raise JobError([f"set has a key that is not a text, {key}; use keys like 'grid.points'"])
 
 
 def _case(job: Job, index: int, sweep: Sweep | None) -> Case:

@@ -264,13 +264,10 @@ def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
     return b"", found
 
 
-def _remedy(problem: str) -> str:
-    """Return the remedy for a frequent message of PyYAML, or ''."""
-    if "\\t" in problem:
-        return "; indent by blanks, not by tabs"
-    if problem.startswith("mapping values"):
-        return "; keys of one mapping must begin in the same column, and a text with a colon needs quotes"
-    return ""
+REMEDIES = {  # by a part of a frequent message of PyYAML
+    "\\t": "; indent by blanks, not by tabs",
+    "mapping values": "; keys of one mapping must begin in the same column, and a text with a colon needs quotes",
+}
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
@@ -283,8 +280,9 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
         source.data = reader.read(text)
     except yaml.MarkedYAMLError as error:
         began = f" ({error.context} in line {error.context_mark.line + 1})" if error.context_mark else ""
-        mark = error.problem_mark or error.context_mark
-        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}{_remedy(str(error.problem))}")
+        remedy = next((remedy for part, remedy in REMEDIES.items() if part in str(error.problem)), "")
+        place = reader.place(error.problem_mark or error.context_mark)
+        source.note(place, f"cannot be read as YAML: {error.problem}{began}{remedy}")
     except yaml.reader.ReaderError as error:
         source.note(start, f"is not a text file in UTF-8: {error.reason} at position {error.position}")
     except yaml.YAMLError as error:
@@ -344,10 +342,12 @@ class _Reader:
         for key, child in node.value:
             if key.tag == YAML_TAG + "merge":
                 merged += child.value if isinstance(child, yaml.SequenceNode) else [child]
-            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str" or _is_no_word(key, child):
-                got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
-                comma = "; write decimals with a point" if _follows_a_comma(key, child) else ""
-                self.refuse(key, f"a key must be a word, got {got}{comma}")
+            elif not isinstance(key, yaml.ScalarNode):
+                self.refuse(key, "a key must be a word, got a list or a mapping")
+            elif key.value[:1].isdigit() and not child.value:  # digits after a decimal comma: {thickness: 0,02}
+                self.refuse(key, f"a key must be a word, got {shorten(key.value)!r}; write decimals with a point")
+            elif key.tag != YAML_TAG + "str" or not is_storable(key.value):
+                self.refuse(key, f"a key must be a word, got {shorten(key.value)!r}")
             elif key.value in found:
                 name, line = ".".join(map(str, (*path, key.value))), self.source.places[*path, key.value][0].line
                 self.refuse(key, f"{shorten(name)} is given twice" + f", first in line {line}" * bool(line))
@@ -359,15 +359,6 @@ class _Reader:
             else:
                 self.refuse(other, "<< must be a mapping, or a list of mappings")
         return found
-
-
-def _is_no_word(key: yaml.ScalarNode, child: yaml.Node) -> bool:
-    return not is_storable(key.value) or _follows_a_comma(key, child)
-
-
-def _follows_a_comma(key: yaml.Node, child: yaml.Node) -> bool:
-    """Return True if a key is probably the digits after a decimal comma, as in {thickness: 0,02}: it has no value."""
-    return isinstance(key, yaml.ScalarNode) and key.value[:1].isdigit() and not child.value
 
 
 def source_of(data: Any, place: Place = NOWHERE) -> Source:
