@@ -35,7 +35,6 @@ from .yaml_text import (
     parse,
     quote,
     read_source,
-    read_with_content,
     shorten,
     source_of,
 )
@@ -284,7 +283,8 @@ def _include(source: Source, job: Path, section: str, own: dict[str, Any]) -> In
         source.note(place, f"{section}.include must name a material file, got {quote(name)} ({found})")
         source.data[section] = UNREADABLE
         return None
-    content, included = read_with_content(found, _shown(found))
+    relative = os.path.relpath(found)
+    included = read_source(found, str(found) if relative.startswith("..") else relative)
     source.mistakes += included.mistakes
     start: Key = ("material",) if isinstance(included.data, dict) and list(included.data) == ["material"] else ()
     material, at = included.data["material"] if start else included.data, included.locate(start).place
@@ -305,7 +305,7 @@ def _include(source: Source, job: Path, section: str, own: dict[str, Any]) -> In
     places |= {path: known for path, known in source.places.items() if path[:1] == root and len(path) > 2}
     source.put(root, material | given, source.locate(root).key_place, at)
     source.places |= places
-    return Included(found.absolute(), hashlib.sha256(content).hexdigest(), section)
+    return Included(found.absolute(), hashlib.sha256(included.content).hexdigest(), section)
 
 
 def _find(name: Any, job: Path) -> Path | str:
@@ -328,12 +328,6 @@ def _find(name: Any, job: Path) -> Path | str:
         return next((path for path in candidates if path.is_file() and path != job.absolute()), where)
     except (OSError, RuntimeError) as error:  # a name that is too long, a user that does not exist
         return shorten(getattr(error, "strerror", None) or str(error))
-
-
-def _shown(path: Path) -> str:
-    """Return a path relative to the working directory if it is below that."""
-    relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") else relative
 
 
 # -- jobs and cases ---------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import re
 import reprlib
 import stat
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, NoReturn
 
@@ -72,7 +72,8 @@ class Located(NamedTuple):
 
 @dataclass
 class Source:
-    """The data of a file, of a mapping or of an override, with its place and its mistakes.
+    """The data of a file, of a mapping or of an override, with its place and its mistakes; `content` are the bytes
+    of a file.
 
     `places` has the places of key and value by path; a value without an entry has the place of the list or mapping
     around it.
@@ -82,6 +83,7 @@ class Source:
     place: Place = NOWHERE
     mistakes: list[Mistake] = field(default_factory=list)
     places: dict[Key, tuple[Place, Place]] = field(default_factory=dict)
+    content: bytes = b""
 
     def note(self, place: Place, sentence: str) -> None:
         self.mistakes.append(Mistake(place, sentence))
@@ -240,18 +242,13 @@ def dump(data: Any) -> str:
 
 def read_source(path: Path, shown: str) -> Source:
     """Return the `Source` of a YAML file, called `shown` in messages; an unreadable file is noted as a mistake."""
-    return read_with_content(path, shown)[1]
-
-
-def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
-    """Return the bytes of a YAML file, and its `Source`."""
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe might never end
             raise OSError(0, "it is not a regular file")
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
         if len(content) <= MAX_BYTES:
-            return content, parse(content, shown)
+            return replace(parse(content, shown), content=content)
         reason = f"it is larger than {MAX_BYTES / 1e6:g} MB, the limit for a job"
     except FileNotFoundError:
         reason = "there is no such file"
@@ -261,7 +258,7 @@ def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
             reason += f"; the job of the run in it is {Path(shown) / 'job.resolved.yaml'}"
     found = Source(UNREADABLE, Place(shorten(shown)))
     found.note(found.place, f"cannot be read: {reason}")
-    return b"", found
+    return found
 
 
 REMEDIES = {  # by a part of a frequent message of PyYAML
