@@ -162,16 +162,16 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
-        load, place = stage.load, ("history", index, stage.control)
+        load, ends = stage.load, tuple[str, ...]()
         if load.lowest >= 0.0:
             continue
         if isinstance(load, Oscillation):
             got = f"must be at most the mean, {load.mean:g}, got {load.amplitude:g}"
-            place = (*place, "amplitude")
+            ends = ("amplitude",)
         else:
             got = f"must be {LOADS[stage.control]}, got {load.lowest:g}"
-            place = place if load.constant else (*place, "from" if load.start == load.lowest else "to")
-        yield Fault(f"{got}; pulling needs adhesion", place)
+            ends = () if load.constant else ("from" if load.start == load.lowest else "to",)
+        yield Fault(f"{got}; pulling needs adhesion", ("history", index, stage.control, *ends))
 
 
 def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
