@@ -44,7 +44,7 @@ class Compound:
     found: "Superposition | None" = None
 
     def material(self) -> dict[str, Any]:
-        """The fitted material as the section of a job."""
+        """Return the fitted material as the section of a job."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
         degrees = self.measured.temperatures
         return {
@@ -161,11 +161,8 @@ class Compound:
             kind = "tensile compliances, times 2 (1 + poisson)," if self.measured.tension else "shear compliances"
         over = "frequency" if self.measured.kind == "frequency" else "time"
         temperatures = self.measured.temperatures
-        noise = (
-            ""
-            if math.isnan(series.scatter)
-            else f"; neighbouring points of a sweep scatter by {per_cent(series.scatter)}"
-        )
+        noise = f"; neighbouring points of a sweep scatter by {per_cent(series.scatter)}"
+        noise = "" if math.isnan(series.scatter) else noise
         lines = [
             f"{TITLE} {self.measured.path.name}: {kind} over {over}.",
             f"# {len(series.moduli)} branches. The fit misses the {self._weighed} by {per_cent(series.error)} (rms), "
@@ -210,8 +207,9 @@ def fitted(
     shift: Shift | None = None if isinstance(law, str) else law
     found: Superposition | None = None
     try:
-        if shift is not None and measured.has_short_sets and vertical in ("auto", "free"):
-            vertical = "none"  # nothing overlaps
+        short = any(each.at.size < moduli.LEAST_ROWS for each in measured.sets)
+        if shift is not None and short and vertical in ("auto", "free"):
+            vertical = "none"  # nothing overlaps, as in a temperature sweep
         if len(temperatures) > 1 and (shift is None or shift.vertical is None):
             middle = temperatures[len(temperatures) // 2] if reference is None else reference
             found = superpose(measured, middle if shift is None else shift.reference, law, vertical, weigh)

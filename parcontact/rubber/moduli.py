@@ -145,11 +145,6 @@ class Measurement:
         """Measured temperatures [deg C], rising; an empty list if the file has none."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
-    @property
-    def has_short_sets(self) -> bool:
-        """True if a set is too short to determine a shift, as in a temperature sweep."""
-        return any(each.at.size < LEAST_ROWS for each in self.sets)
-
     def without_short_sets(self) -> "Measurement":
         """Return the sets that are long enough to determine a shift; raises InputError if there are none."""
         long = tuple(each for each in self.sets if each.at.size >= LEAST_ROWS)
@@ -206,7 +201,9 @@ class _Table:
         else:
             at, moduli = self._column("t", TIMES), [1.0 / self._column(f"{letter}_creep", COMPLIANCES)]
         moduli = [factor * each for each in moduli]
-        degrees = self.values["T"] + self._unit("T", TEMPERATURES) if "T" in self.values else None
+        degrees = None
+        if "T" in self.values:
+            degrees = self.values["T"] + unit_size(self.path, "T", self.units["T"], TEMPERATURES)
         refuse_odd(self.path, kind, at, moduli[0], degrees)
         sets = tuple(_sets(self.path, at, moduli, degrees))
         if kind != "frequency":
@@ -217,10 +214,8 @@ class _Table:
         """Decide whether moduli named by words are of tension (E) or shear (G); yield a warning for shear."""
         if not any(name.startswith("*") for name in self.values):
             return
-        creep, named = (
-            "*_creep" in self.values,
-            [letter for letter in "EG" if any(f"{letter}_" in n for n in self.values)],
-        )
+        creep = "*_creep" in self.values
+        named = [letter for letter in "EG" if any(f"{letter}_" in name for name in self.values)]
         radians = "omega" in self.values and self.units["omega"] != "Hz"
         letter = named[0] if named else "G" if creep or radians else "E"
         for columns in (self.values, self.units):
@@ -274,7 +269,7 @@ class _Table:
 
     def _column(self, name: str, units: dict[str, float]) -> Array:
         """Return a column of positive numbers in SI units."""
-        return self._positive(name) * self._unit(name, units)
+        return self._positive(name) * unit_size(self.path, name, self.units[name], units)
 
     def _positive(self, name: str) -> Array:
         if name not in self.values:
@@ -285,9 +280,6 @@ class _Table:
             raise InputError(f"{self.path}:{line}: {name} must be positive, got {value:g}")
         return self.values[name]
 
-    def _unit(self, name: str, known: dict[str, float]) -> float:
-        return unit_size(self.path, name, self.units[name], known)
-
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:
     """Yield the set of each temperature, by rising rates; for a temperature sweep one set per row."""
@@ -295,8 +287,7 @@ def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None
     for rows in one if temperatures is None else _of_one_temperature(path, at, temperatures):
         mean = None if temperatures is None else float(temperatures[rows].mean())
         rows = rows[np.argsort(at[rows], kind="stable")]
-        empty = np.zeros(0)
-        yield Set(mean, at[rows], moduli[0][rows], moduli[1][rows] if len(moduli) > 1 else empty)
+        yield Set(mean, at[rows], moduli[0][rows], moduli[1][rows] if len(moduli) > 1 else np.zeros(0))
 
 
 def _of_one_temperature(path: Path, at: Array, temperatures: Array) -> Iterator[NDArray[np.intp]]:

@@ -463,8 +463,9 @@ class _Search:
         grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
         first = Density(EXPANSION, self.reference)
         points = streams.with_bar(grid, "shift with temperature", "law")
-        errors = [self._misfit(replace(self._named(point), vertical=first)) for point in points]
-        if not math.isfinite(min(errors)):
+        tried = (self._residuals(replace(self._named(point), vertical=first), COARSE) for point in points)
+        errors = [float(np.mean(residuals**2)) for residuals in tried]
+        if min(errors) >= FAR**2:
             raise InputError(
                 f"{self.measured.path}: no constants of this law join the sweeps to one curve at {self.reference:g} C"
             )
@@ -536,37 +537,30 @@ class _Search:
                 self._horizontal(constants[: start.size]), vertical=self._vertical(kind, constants[start.size :])
             )
 
-        def missed(constants: Array) -> Array:
-            try:
-                tried = shift(constants)
-                if self._spread(tried) <= MOST_DECADES:
-                    return best_residuals(self._reduced(tried), per_decade)
-            except InputError:  # where a law ends
-                pass
-            return np.full(self._reduced(None).counted, FAR)
-
         if begin.size:
-            begin = least_squares(missed, begin, x_scale=0.1, diff_step=STEP, xtol=CLOSE, ftol=CLOSE).x
+            begin = least_squares(
+                lambda constants: self._residuals(shift(constants), per_decade),
+                begin,
+                x_scale=0.1,
+                diff_step=STEP,
+                xtol=CLOSE,
+                ftol=CLOSE,
+            ).x
         found = shift(begin)
-        return Superposition(found, float(np.sqrt(np.mean(best_residuals(self._reduced(found)) ** 2))))
+        return Superposition(found, _rms(best_residuals(self._reduced(found))))
 
-    def _reduced(self, shift: Shift | None) -> ReducedData:
-        sets, kind = self.measured.sets, self.measured.kind
-        if shift is None:
-            return reduce_sets(sets, kind, weigh=self.weigh)
-        return reduce_sets(sets, kind, log_factors(shift, self._known), self.weigh)
-
-    def _spread(self, shift: Shift) -> float:
-        """Return the shift between the measured temperatures [decades]."""
-        return float(np.ptp([shift.log_factor(t) for t in self._known]))
-
-    def _misfit(self, shift: Shift) -> float:
+    def _residuals(self, shift: Shift, per_decade: int) -> Array:
+        """Return the residuals of the best series for a shift; FAR where a law ends, and for a shift over more than
+        MOST_DECADES between the measured temperatures."""
         try:
-            if not self._spread(shift) <= MOST_DECADES:
-                return math.inf
+            if np.ptp([shift.log_factor(t) for t in self._known]) <= MOST_DECADES:
+                return best_residuals(self._reduced(shift), per_decade)
         except InputError:
-            return math.inf
-        return float(np.mean(best_residuals(self._reduced(shift), COARSE) ** 2))
+            pass
+        return np.full(reduce_sets(self.measured.sets, self.measured.kind, weigh=self.weigh).counted, FAR)
+
+    def _reduced(self, shift: Shift) -> ReducedData:
+        return reduce_sets(self.measured.sets, self.measured.kind, log_factors(shift, self._known), self.weigh)
 
 
 def log_factors(shift: Shift, temperatures: Sequence[float]) -> tuple[list[float], list[float]]:

@@ -193,11 +193,8 @@ def _table(path: Path, reference: float | None) -> Factors:
     temperatures, *logs = zip(*rows, strict=True)
     if len(set(temperatures)) < len(temperatures):
         raise InputError(f"{path}: a temperature has two factors")
-    at = (
-        min(zip(temperatures, logs[0], strict=True), key=lambda pair: abs(pair[1]))[0]
-        if reference is None
-        else reference
-    )
+    nearest = min(zip(logs[0], temperatures, strict=True), key=lambda pair: abs(pair[0]))[1]
+    at = nearest if reference is None else reference
     if not temperatures[0] <= at <= temperatures[-1]:
         raise InputError(f"{path}: the reference temperature {at:g} C is outside its factors")
     return Factors(temperatures, logs[0], at, Factors(temperatures, logs[1], at) if len(logs) > 1 else None)
