@@ -54,7 +54,6 @@ STANDS_ON = {  # modules that stand on another floor than their room
     **_on(
         "report",
         "results.page",
-        "results.curve_tables",
         "results.export",
         "results.report_sections",
         "results.prediction",

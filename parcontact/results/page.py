@@ -1,9 +1,9 @@
-"""`parcontact report`: the page and its chapters.
+"""`parcontact report`: the page, its chapters, and sections on the job.
 
 * The HTML page of a report, which loads no other files.
 * Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study.
 * Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine.
-* Sections on errors and costs, program, machine and runs, and references to cite.
+* Sections on errors and costs, program, machine and runs, and references to cite; on the rigid surface and material.
 """
 
 import json
@@ -11,26 +11,39 @@ import math
 import re
 import stat
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from .. import job as jobs
-from .. import streams
+from .. import printed, streams
+from ..bands.band import Band
+from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
 from ..columns import TABLES
+from ..effects.relaxation import relaxation_of
 from ..errors import InputError
 from ..files import files, hdf5, outputs, provenance
 from ..files.provenance import PROGRAM
 from ..files.recorder import WARNING, log_lines
-from ..job import Job, listing
+from ..job import Dma, Indenter, Job, Zener, listing
 from ..job.listing import plain_data
+from ..job.meaning import excited_band
 from ..job.reading import CASES, shown_job
+from ..march import rigid_surface
+from ..march.measured_range import excited_bands
+from ..parallel.fft import FFT
+from ..parallel.slab import Slab
+from ..physics import surface_statistics
+from ..physics.prony import complex_modulus
 from ..printed import name_cases
-from . import info, plots, report_sections
-from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_panel, embed_file
+from . import info, plots, report_sections, style, surface_summary
+from .panels import Axis, Line, Panel, Shade
+from .report_sections import Chapter, Picture, ReportSection, ReportTable, compared_table, draw_panel, embed_file
 from .results import Results, swept_keys
 from .slide import ERRORS
 
@@ -143,6 +156,150 @@ def list_citations(job: Job | None) -> ReportSection:
     )
 
 
+MOST_POINTS = 2**22  # most points of a surface that is computed for a report
+
+
+def road_section(job: Job) -> ReportSection:
+    """Return the section on the surface of a job, computed again; only its keys if its files are gone or it is too
+    large."""
+    shapes = ReportTable(
+        ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
+    )
+    if job.bands is not None:
+        return _describe_bands(job, shapes)
+    if job.grid.nx * job.grid.ny == 1:  # a job in bands without its files
+        return ReportSection("Surface", ["The surface cannot be computed again: the files of the job do not exist."])
+    if job.grid.nx * job.grid.ny > MOST_POINTS:
+        return ReportSection(
+            "Surface", ["The surface has too many points to be computed again for a report."], [shapes]
+        )
+    slab = Slab.alone(*job.grid.points)
+    try:
+        made, remarks = rigid_surface.make_surface(job, FFT(slab))
+    except InputError as error:
+        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
+    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*remarks.notes, *map(str, remarks.doubts)]
+    found = surface_statistics.surface_statistics(heights, job.grid.size)
+    if not found.rms_height:
+        return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
+    waves = any(not isinstance(part, Indenter) for part in job.surface)
+    tables = [
+        shapes,
+        *([ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))] if waves else []),
+    ]
+    return ReportSection("Surface", sentences, tables, _draw(surface_summary.Sketch(heights, job.grid.size, found)))
+
+
+def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
+    """Return the section on the bands of a job, and the surface of the coarsest one."""
+    try:
+        cut = cut_bands(job)
+        setup = Band(job, cut, 0, 0).setup
+    except InputError as error:
+        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
+    rows = []
+    for band in range(cut.count):
+        ends = " to ".join(printed.quantity(end, "m") for end in cut.wavelengths(band))
+        rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
+    bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
+    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+    found = surface_statistics.surface_statistics(heights, setup.grid.size)
+    pictures = _draw(surface_summary.Sketch(heights, setup.grid.size, found), ", coarsest band")
+    tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), surface_summary.list_statistics(found))]
+    return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
+
+
+def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:
+    return [draw_panel(panel, f"{caption}{of}") for caption, panel in surface_summary.panels_of(sketch).items()]
+
+
+DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
+MODULI_POINTS = 400  # number of points of a line
+CAPTION = "{} over frequency, at the temperature of the job"
+
+
+def material_section(job: Job) -> ReportSection:
+    """Return the section on the material of a job at its temperature."""
+    if job.bands is not None:
+        with suppress(InputError):  # its files no longer exist
+            job = on_one_grid_of_all(job, cut_bands(job))
+    series = relaxation_of(job.material)
+    instant = series.modulus_inf + float(np.sum(series.moduli))
+    rows = [
+        ("long-term shear modulus", printed.quantity(series.modulus_inf, "Pa", 4)),
+        ("instantaneous shear modulus", printed.quantity(instant, "Pa", 4)),
+        ("Poisson's ratio", f"{job.material.poisson:g}"),
+        ("relaxing branches", str(series.moduli.size)),
+        *_describe_temperature(job),
+    ]
+    if job.included:
+        rows.append(("included from", job.included))
+    tables = [ReportTable(("property", "value"), rows)]
+    if not series.moduli.size:
+        return ReportSection("Material", tables=tables)
+    branches = zip(series.relaxation_times, series.moduli, strict=True)
+    listed = [(printed.quantity(float(tau), "s"), printed.quantity(float(modulus), "Pa")) for tau, modulus in branches]
+    tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
+    if (excited := _list_bands(job)).rows:
+        tables.append(excited)
+    return ReportSection(
+        "Material",
+        tables=tables,
+        pictures=[draw_panel(panel, CAPTION.format(panel.y.name)) for panel in _over_frequency(job)],
+    )
+
+
+def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
+    found = job.material.fitted
+    if isinstance(given := job.material.given, Dma):
+        yield "fitted to", str(given.path)
+    if not isinstance(found, Zener):
+        return
+    if found.shift is not None:
+        reference = found.shift.made.reference
+        temperature = reference if found.temperature is None else found.temperature
+        yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
+        yield "shift factor a_T", f"{found.time_factor:.4g}"
+        if found.shift.vertical is not None:
+            yield "vertical shift factor b_T", f"{found.modulus_factor:.4g}"
+    if found.band is not None:
+        yield "measured frequencies, reduced to the reference", _write_band(found.band)
+    if found.temperatures is not None:
+        yield "measured temperatures", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
+
+
+def _list_bands(job: Job) -> ReportTable:
+    """Return a table of the frequencies that sliding excites at each temperature."""
+    found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
+    degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
+    ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
+    rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
+    caption = "frequencies of the passing waves of the surface, at all velocities of the job"
+    return ReportTable(("temperature", "a_T", "excited by the job", "reduced to the reference"), rows, caption)
+
+
+def _write_band(band: tuple[float, float]) -> str:
+    return f"{printed.quantity(band[0], 'Hz')} to {printed.quantity(band[1], 'Hz')}"
+
+
+def _over_frequency(job: Job) -> list[Panel]:
+    """Return the panels of storage and loss modulus, and of the loss tangent, at all relaxation times and frequencies
+    that the job excites."""
+    series, band = relaxation_of(job.material), excited_band(job)
+    natural = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
+    seen = [natural.min() - DECADES, natural.max() + DECADES, *map(math.log10, band or ())]
+    frequency = np.logspace(min(seen), max(seen), MODULI_POINTS)
+    omega = 2 * math.pi * frequency
+    value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
+    moduli = [Line("G' storage", frequency, value.real), Line("G'' loss", frequency, value.imag, style.line(1))]
+    shades = [Shade("excited by the job", *band)] if band else []
+    x, tangent = Axis("frequency", "Hz"), [Line("", frequency, value.imag / value.real)]
+    return [
+        Panel("moduli", x, Axis("shear modulus", "Pa"), moduli, shades=shades, log_x=True, log_y=True),
+        Panel("tangent", x, Axis("loss tangent tan δ"), tangent, shades=shades, log_x=True),
+    ]
+
+
 SHOWN = {  # words and sections of the kinds of results
     "run": ("run", report_sections.describe_run),
     "steady": ("friction curve", report_sections.describe_curve),
@@ -169,7 +326,7 @@ def describe_directory(directory: Path) -> Chapter:
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(ORIGINALS[resolved.name]))
-        of_job = [asked, report_sections.material_section(job), report_sections.road_section(job)]
+        of_job = [asked, material_section(job), road_section(job)]
         if there == ["sweep"]:
             of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
             of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]

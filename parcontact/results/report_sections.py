@@ -1,48 +1,217 @@
-"""Sections of a report: results of a run, friction curve, sweep or study with maps; the rigid surface; the material."""
+"""Parts of a report, and its sections on results: of a run, a friction curve, a sweep or a study, with their maps.
 
+* Parts are texts, tables, pictures, browsers of maps and data, all stored in the page.
+* Tables show friction by speed and temperature for each pressure, of one curve or of several side by side, and the
+  important lengths, frequencies and moduli.
+"""
+
+import base64
 import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import h5py
 import numpy as np
+from matplotlib.figure import Figure
 from PIL import Image
 
 from .. import capabilities, printed, streams
-from ..bands.band import Band
-from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
+from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import STEADY, SWEEP, UNITS
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
-from ..files import hdf5, outputs
-from ..job import Dma, Indenter, Job, Zener, listing
+from ..files import hdf5, outputs, tables
+from ..job import Job, listing, load
 from ..job.listing import answers
-from ..job.meaning import excited_band
-from ..march import rigid_surface
 from ..march.measured_range import excited_bands
-from ..parallel.fft import FFT
-from ..parallel.slab import Slab
-from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
-from . import band_charts, info, maps, plotted_run, slide, style, surface_summary
-from .curve_tables import (
-    RC,
-    Browser,
-    Picture,
-    ReportSection,
-    ReportTable,
-    draw_panel,
-    friction_tables,
-    scales_table,
-    to_uri,
-)
-from .panels import Axis, Line, Panel, Shade
+from ..printed import quantity, with_error
+from . import band_charts, info, maps, plotted_run, slide, style
+from .panels import Panel, draw
 from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
 from .results import PLACES, Results, read_cases
+
+SIZE = (4.2, 2.9)  # size of a panel, half the width of a laptop's screen [inch]
+RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts
+
+Picture = tuple[str, str]  # data URI, and caption
+Browser = tuple[str, Sequence[Picture], int]  # name of a map, its pictures, and the index of the first shown
+Download = tuple[str, str, int]  # a file stored in the page: its name, data URI and size [bytes]
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """A table of a report: names of columns, and rows of texts."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class ReportSection:
+    """A section of a report: a heading and contents, shown in the order of the fields. `texts` are shown verbatim."""
+
+    title: str
+    sentences: Sequence[str] = ()
+    tables: Sequence[ReportTable] = ()
+    pictures: Sequence[Picture] = ()
+    browsers: Sequence[Browser] = ()
+    texts: Sequence[tuple[str, str]] = ()
+    downloads: Sequence[Download] = ()
+
+    def __bool__(self) -> bool:
+        """Return True if the section has contents."""
+        return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
+
+    def without(self, places: Sequence[str]) -> "ReportSection":
+        """Return the section with the directories `places` removed from paths in its sentences and tables."""
+
+        def shorten(text: str) -> str:
+            for place in places:
+                text = text.replace(place, "")
+            return text
+
+        tables = [replace(one, rows=[[shorten(cell) for cell in row] for row in one.rows]) for one in self.tables]
+        return replace(self, sentences=[shorten(text) for text in self.sentences], tables=tables)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter of a report about one output directory; `headline` is a sentence with the results."""
+
+    title: str
+    directory: Path
+    kind: str
+    sections: Sequence[ReportSection]
+    headline: str = ""
+
+
+def draw_panel(panel: Panel, caption: str = "") -> Picture:
+    """Return a picture of one panel, as SVG; its caption names its axes by default."""
+    file = io.BytesIO()
+    with style.drawing(RC):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.subplots()
+        draw(panel, axes)
+        (extra,) = style.place_legends([[axes]])
+        style.set_height(figure, SIZE[1] + extra)
+        figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
+    caption = caption or f"{panel.y.name} over {panel.x.name}".replace("\n", " ")
+    return to_uri(file.getvalue(), "image/svg+xml"), caption
+
+
+def embed_file(path: Path) -> Download:
+    """Return a file as a download that is stored in the page."""
+    data = path.read_bytes()
+    return path.name, to_uri(data, "text/csv"), len(data)
+
+
+def to_uri(data: bytes, kind: str) -> str:
+    """Return data as a data URI."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+MOST = 60  # most rows of a table
+PLACE_DIGITS = 6  # significant digits of speeds, pressures and temperatures that count as equal
+Place = tuple[float, float, float]  # speed [m/s], pressure [Pa], temperature [deg C] (NaN: not known)
+
+
+def friction_tables(curve: Results) -> list[ReportTable]:
+    """Return a table of friction for each pressure, with a row for each speed and a column for each temperature."""
+    cells = {_round(one.at, curve.temperature): "not solved" for one in tables.read(curve.path)}
+    cells = _cells(curve) | cells
+    degrees, found = list(dict.fromkeys(place[2] for place in sorted(cells, key=_order))), []
+    for pressure in dict.fromkeys(place[1] for place in sorted(cells, key=_order)):
+        speeds = sorted({place[0] for place in cells if place[1] == pressure})
+        rows = [
+            [quantity(speed, "m/s"), *(cells.get((speed, pressure, each), "–") for each in degrees)] for speed in speeds
+        ]
+        head = ["velocity", *(f"at {each:g} °C" if each > -math.inf else "friction" for each in degrees)]
+        found.append(ReportTable(head, rows[:MOST], f"friction under {quantity(pressure, 'Pa')}"))
+    return found
+
+
+def compared_table(directories: Sequence[Path], names: Sequence[str]) -> list[ReportTable]:
+    """Return a table with the friction of several curves at points that two or more have; an empty list without any."""
+    each = [_cells(Results(one, "steady")) if Results(one).has(outputs.STEADY.table) else {} for one in directories]
+    places = sorted({place for cells in each for place in cells}, key=_order)
+    shared = [place for place in places if sum(place in cells for cells in each) > 1]
+    warm = any(place[2] > -math.inf for place in shared)
+    rows = []
+    for speed, pressure, degrees in shared[:MOST]:
+        at = [quantity(speed, "m/s"), quantity(pressure, "Pa"), *([f"{degrees:g} °C"] if warm else [])]
+        rows.append([*at, *(cells.get((speed, pressure, degrees), "–") for cells in each)])
+    head = ["velocity", "pressure", *(["temperature"] if warm else []), *names]
+    more = f", the first {MOST} of {len(shared)} points" if len(shared) > MOST else ""
+    return [ReportTable(head, rows, f"friction side by side{more}")] if rows else []
+
+
+def _cells(curve: Results) -> dict[Place, str]:
+    """Return the friction with its error at each point of a curve."""
+    columns = curve.table
+    count = len(columns["friction"])
+    degrees, errors = (columns.get(name, [math.nan] * count) for name in ("temperature", "error_friction"))
+    found = zip(columns["velocity"], columns["pressure"], degrees, columns["friction"], errors, strict=True)
+    return {_round(place, curve.temperature): with_error(mu, mu * error) for *place, mu, error in found}
+
+
+def _round(place: Sequence[float], given: float) -> Place:
+    """Return a point with values that count as equal as equal numbers; a temperature that is not known is -infinity."""
+    speed, pressure, degrees = (float(f"{value:.{PLACE_DIGITS}g}") for value in place)
+    degrees = given if math.isnan(degrees) else degrees
+    return speed, pressure, -math.inf if math.isnan(degrees) else degrees
+
+
+def _order(place: Place) -> tuple[float, float, float]:
+    speed, pressure, degrees = place
+    return degrees, pressure, speed
+
+
+def scales_table(curve: Results) -> list[ReportTable]:
+    """Return a table of the lengths, frequencies and moduli that matter for a curve; empty if the job's files are
+    gone."""
+    if (path := curve.job_file) is None:
+        return []
+    with suppress(InputError):
+        job = load(path)
+        rows = [*_lengths(job)]
+        whole = on_one_grid_of_all(job, cut_bands(job)) if job.bands is not None else job
+        for one in excited_bands(whole, (job.steady.temperatures if job.steady else None) or ()):
+            body = whole if one.temperature is None else whole.at_temperature(one.temperature)
+            at = "" if one.temperature is None else f" at {one.temperature:g} °C"
+            rows.append((f"frequencies that the job excites{at}", _span(one.band, "Hz")))
+            rows.append((f"shear moduli |G| at these frequencies{at}", _span(_moduli(body, one.band), "Pa")))
+        if (measured := getattr(job.material.fitted, "band", None)) is not None:
+            rows.append(("measured frequencies, at the reference temperature", _span(measured, "Hz")))
+        return [ReportTable(("what matters", "range"), rows, "lengths, frequencies and moduli")]
+    return []
+
+
+def _lengths(job: Job) -> list[tuple[str, str]]:
+    if job.bands is not None:
+        ends = cut_bands(job).spectrum.ends
+        return [("waves of the surface", _span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
+    waves = ([getattr(part, f"{end}_wavelength", None) for end in ("long", "short")] for part in job.surface)
+    rows = [("waves of the surface", _span([end for end in each if end], "m")) for each in waves if all(each)]
+    return [*rows, ("cell of the grid", quantity(max(job.grid.dx, job.grid.dy), "m"))]
+
+
+def _moduli(job: Job, band: tuple[float, float]) -> tuple[float, float]:
+    """Return the magnitude of the shear modulus [Pa] at both ends of a band of frequencies [Hz]."""
+    series = relaxation_of(job.material)
+    omega = 2 * math.pi * np.array(band)
+    low, high = np.abs(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times)).tolist()
+    return low, high
+
+
+def _span(ends: Sequence[float], unit: str) -> str:
+    return " to ".join(quantity(end, unit) for end in ends)
+
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -229,147 +398,3 @@ def _label_states(area: float, file: h5py.File) -> dict[int, str]:
     warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size
     known = np.flatnonzero(~np.isnan(speeds)).tolist()
     return {k: f"{printed.quantity(speeds[k], 'm/s')}, {printed.quantity(loads[k], axis.unit)}{warm[k]}" for k in known}
-
-
-MOST_POINTS = 2**22  # most points of a surface that is computed for a report
-
-
-def road_section(job: Job) -> ReportSection:
-    """Return the section on the surface of a job, computed again; only its keys if its files are gone or it is too
-    large."""
-    shapes = ReportTable(
-        ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
-    )
-    if job.bands is not None:
-        return _describe_bands(job, shapes)
-    if job.grid.nx * job.grid.ny == 1:  # a job in bands without its files
-        return ReportSection("Surface", ["The surface cannot be computed again: the files of the job do not exist."])
-    if job.grid.nx * job.grid.ny > MOST_POINTS:
-        return ReportSection(
-            "Surface", ["The surface has too many points to be computed again for a report."], [shapes]
-        )
-    slab = Slab.alone(*job.grid.points)
-    try:
-        made, remarks = rigid_surface.make_surface(job, FFT(slab))
-    except InputError as error:
-        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
-    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*remarks.notes, *map(str, remarks.doubts)]
-    found = surface_statistics.surface_statistics(heights, job.grid.size)
-    if not found.rms_height:
-        return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
-    waves = any(not isinstance(part, Indenter) for part in job.surface)
-    tables = [
-        shapes,
-        *([ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))] if waves else []),
-    ]
-    return ReportSection("Surface", sentences, tables, _draw(surface_summary.Sketch(heights, job.grid.size, found)))
-
-
-def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
-    """Return the section on the bands of a job, and the surface of the coarsest one."""
-    try:
-        cut = cut_bands(job)
-        setup = Band(job, cut, 0, 0).setup
-    except InputError as error:
-        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
-    rows = []
-    for band in range(cut.count):
-        ends = " to ".join(printed.quantity(end, "m") for end in cut.wavelengths(band))
-        rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
-    bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
-    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
-    found = surface_statistics.surface_statistics(heights, setup.grid.size)
-    pictures = _draw(surface_summary.Sketch(heights, setup.grid.size, found), ", coarsest band")
-    tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), surface_summary.list_statistics(found))]
-    return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
-
-
-def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:
-    return [draw_panel(panel, f"{caption}{of}") for caption, panel in surface_summary.panels_of(sketch).items()]
-
-
-DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
-MODULI_POINTS = 400  # number of points of a line
-CAPTION = "{} over frequency, at the temperature of the job"
-
-
-def material_section(job: Job) -> ReportSection:
-    """Return the section on the material of a job at its temperature."""
-    if job.bands is not None:
-        with suppress(InputError):  # its files no longer exist
-            job = on_one_grid_of_all(job, cut_bands(job))
-    series = relaxation_of(job.material)
-    instant = series.modulus_inf + float(np.sum(series.moduli))
-    rows = [
-        ("long-term shear modulus", printed.quantity(series.modulus_inf, "Pa", 4)),
-        ("instantaneous shear modulus", printed.quantity(instant, "Pa", 4)),
-        ("Poisson's ratio", f"{job.material.poisson:g}"),
-        ("relaxing branches", str(series.moduli.size)),
-        *_describe_temperature(job),
-    ]
-    if job.included:
-        rows.append(("included from", job.included))
-    tables = [ReportTable(("property", "value"), rows)]
-    if not series.moduli.size:
-        return ReportSection("Material", tables=tables)
-    branches = zip(series.relaxation_times, series.moduli, strict=True)
-    listed = [(printed.quantity(float(tau), "s"), printed.quantity(float(modulus), "Pa")) for tau, modulus in branches]
-    tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
-    if (excited := _list_bands(job)).rows:
-        tables.append(excited)
-    return ReportSection(
-        "Material",
-        tables=tables,
-        pictures=[draw_panel(panel, CAPTION.format(panel.y.name)) for panel in _over_frequency(job)],
-    )
-
-
-def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
-    found = job.material.fitted
-    if isinstance(given := job.material.given, Dma):
-        yield "fitted to", str(given.path)
-    if not isinstance(found, Zener):
-        return
-    if found.shift is not None:
-        reference = found.shift.made.reference
-        temperature = reference if found.temperature is None else found.temperature
-        yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
-        yield "shift factor a_T", f"{found.time_factor:.4g}"
-        if found.shift.vertical is not None:
-            yield "vertical shift factor b_T", f"{found.modulus_factor:.4g}"
-    if found.band is not None:
-        yield "measured frequencies, reduced to the reference", _write_band(found.band)
-    if found.temperatures is not None:
-        yield "measured temperatures", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
-
-
-def _list_bands(job: Job) -> ReportTable:
-    """Return a table of the frequencies that sliding excites at each temperature."""
-    found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
-    degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
-    ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
-    rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
-    caption = "frequencies of the passing waves of the surface, at all velocities of the job"
-    return ReportTable(("temperature", "a_T", "excited by the job", "reduced to the reference"), rows, caption)
-
-
-def _write_band(band: tuple[float, float]) -> str:
-    return f"{printed.quantity(band[0], 'Hz')} to {printed.quantity(band[1], 'Hz')}"
-
-
-def _over_frequency(job: Job) -> list[Panel]:
-    """Return the panels of storage and loss modulus, and of the loss tangent, at all relaxation times and frequencies
-    that the job excites."""
-    series, band = relaxation_of(job.material), excited_band(job)
-    natural = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
-    seen = [natural.min() - DECADES, natural.max() + DECADES, *map(math.log10, band or ())]
-    frequency = np.logspace(min(seen), max(seen), MODULI_POINTS)
-    omega = 2 * math.pi * frequency
-    value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
-    moduli = [Line("G' storage", frequency, value.real), Line("G'' loss", frequency, value.imag, style.line(1))]
-    shades = [Shade("excited by the job", *band)] if band else []
-    x, tangent = Axis("frequency", "Hz"), [Line("", frequency, value.imag / value.real)]
-    return [
-        Panel("moduli", x, Axis("shear modulus", "Pa"), moduli, shades=shades, log_x=True, log_y=True),
-        Panel("tangent", x, Axis("loss tangent tan δ"), tangent, shades=shades, log_x=True),
-    ]

@@ -18,7 +18,7 @@ from parcontact.effects.heat.solver import Flash
 from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
 from parcontact.job.meaning import excited_band
 from parcontact.parallel.slab import Slab
-from parcontact.results import band_charts, report_sections
+from parcontact.results import band_charts, page
 
 LONG = 4e-3
 MEASURED = {
@@ -133,12 +133,12 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     Path("job.yaml").write_text(yaml.safe_dump(job_of([table], bands={"count": 2, "points": 36, "samples": 1})))
     assert main(["steady", "job.yaml", "--velocities", "0.1", "--temperatures", "20", "--quiet"]) == 0
     assert main(["report", "out/job"]) == 0
-    page = re.sub("<[^>]+>", " ", Path("out/job/report.html").read_text())
-    assert "cannot be computed again" not in page
-    assert "the band with most of the friction" in page
-    assert "with all longer waves" in page
+    shown = re.sub("<[^>]+>", " ", Path("out/job/report.html").read_text())
+    assert "cannot be computed again" not in shown
+    assert "the band with most of the friction" in shown
+    assert "with all longer waves" in shown
     mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
-    section = report_sections.road_section(mapped)
+    section = page.road_section(mapped)
     assert len(section.tables[1].rows) == cut_bands(mapped).count
     assert len(section.pictures) == 4
 

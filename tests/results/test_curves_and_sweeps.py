@@ -9,7 +9,7 @@ import pytest
 
 from parcontact import job
 from parcontact.errors import InputError
-from parcontact.results import curve_tables, export, info
+from parcontact.results import export, info, report_sections
 from parcontact.results.results import Results
 
 JOB = """
@@ -90,16 +90,16 @@ def test_friction_over_speed_and_temperature(curve: Path) -> None:
     """A table for each pressure; a point that is lost is named, one that is to come is a dash."""
     lost = '[{"velocity": 0.1, "pressure": 3e5, "temperature": 20, "why": "no"}]'
     (curve / "steady.lost.json").write_text(lost)
-    tables = curve_tables.friction_tables(Results(curve, "steady"))
+    tables = report_sections.friction_tables(Results(curve, "steady"))
     assert [table.caption for table in tables] == [f"friction under {p} kPa" for p in (100, 200, 300)]
     assert all(list(table.head) == ["velocity", "at 20 °C", "at 40 °C"] for table in tables)
     assert list(tables[0].rows[0]) == ["100 mm/s", "2.00 ± 0.20", "4.00 ± 0.40"]
     assert list(tables[1].rows[2]) == ["10 m/s", "200 ± 20", "–"]
     assert list(tables[2].rows[0]) == ["100 mm/s", "not solved", "–"]
-    scales = {row[0]: row[1] for row in curve_tables.scales_table(Results(curve, "steady"))[0].rows}
+    scales = {row[0]: row[1] for row in report_sections.scales_table(Results(curve, "steady"))[0].rows}
     assert scales["frequencies that the job excites at 40 °C"] == "100 Hz to 10 kHz"
     assert scales["measured frequencies, at the reference temperature"] == "50 Hz to 3 kHz"
-    (compared,) = curve_tables.compared_table([curve, curve], ["soft", "hard"])
+    (compared,) = report_sections.compared_table([curve, curve], ["soft", "hard"])
     assert list(compared.head) == ["velocity", "pressure", "temperature", "soft", "hard"]
     assert list(compared.rows[0]) == ["100 mm/s", "100 kPa", "20 °C", "2.00 ± 0.20", "2.00 ± 0.20"]
 
