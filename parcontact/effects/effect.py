@@ -369,8 +369,8 @@ class Effect(Protocol[Memory]):
 
     def __init__(self, scene: Any) -> None: ...
 
-    def last_lines(self, memory: Memory) -> Iterator[str]:
-        """Yield sentences for the end of a run; local."""
+    def last_lines(self, memory: Memory) -> Iterator[str | Doubt]:
+        """Yield sentences, and warnings about the results, for the end of a run; local."""
         yield from ()
 
     def law(self) -> ContactLaw[Any] | None:

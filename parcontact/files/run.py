@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ..doubts import Doubt
 from ..effects.effect import Detached, columns_of
 from ..errors import DONE, STOPPED_EARLY, InputError, RunError
 from ..job import Job, Rough, RoughSpectrum, listing
@@ -214,7 +215,10 @@ class Run:
             console.say("no error is stated for steps whose spots of contact may be smaller than a cell")
         for name, effect in self.march.scene.effects.items():
             for text in effect.last_lines(self.march.state.memories[name]):
-                console.say(text)
+                if isinstance(text, Doubt):
+                    console.warn(str(text), shown=self.options.shows(text))
+                else:
+                    console.say(text)
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

@@ -35,6 +35,15 @@ ANSWERS = """
 
         yield Panel("wear", along.axis, Axis("wear", "m"), along.series({"": run.columns["wear_depth"]}))
 
+    def last_lines(self, memory):
+        from parcontact.doubts import Kind
+
+        worn, allowed = float(memory[1]), 1e-15
+        yield "the tread was worn"
+        yield Kind("worn", "the tread is worn by {worn:.3g} m, more than {allowed:g} m; use a smaller coefficient")(
+            "wear", {"worn": worn, "allowed": allowed}
+        )
+
     def follow("""
 
 
@@ -50,12 +59,16 @@ def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_sentences_headlines_and_panels(main: Main, job: Path) -> None:
-    assert main("job.yaml", "--quiet", "--out", "out")[0] == 0
+    code, _, warned = main("job.yaml", "--quiet", "--out", "out")
+    assert code == 0
+    assert "warning: wear: the tread is worn by 5.15e-12 m, more than 1e-15 m; use a smaller coefficient" in warned
     code, said, _ = main("info", "out")
     assert code == 0
     assert re.search(r"^  the tread is worn by \S+ m$", said, re.MULTILINE)
     assert main("report", "out")[0] == 0
-    assert "the tread is worn; " in (job.parent / "out" / "report.html").read_text()
+    reported = (job.parent / "out" / "report.html").read_text()
+    assert "the tread is worn; " in reported
+    assert "use a smaller coefficient" in reported
     assert "wear" in [chart.key for chart in plotted_run.panels_of_run(PlottedRun(job.parent / "out"))]
     assert main("plot", "out", "--panels", "wear")[0] == 0
 
