@@ -6,7 +6,7 @@ points touch first.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -16,7 +16,6 @@ import h5py
 import numpy as np
 
 from .. import text_tables
-from ..columns import MeasuredColumn
 from ..errors import InputError
 from ..parallel.slab import Array
 from . import Topography
@@ -163,19 +162,15 @@ def _text(part: Topography) -> MapContents:
         return MapContents(table.squeeze())
     named = text_tables.header_of(head[-1], columns) if head else []
     axes, units = "xyz" if columns == 3 else "xz", [UNITS.get(column.unit or "") for column in named]
-    places = [[column.name.lower() for column in named].index(name) for name in axes] if _name(named, axes) else None
-    if places is not None:
+    names = [column.name.lower() for column in named]
+    if sorted(names) == list(axes):
+        places = [names.index(name) for name in axes]
         table, units = table[:, places], [units[k] for k in places]
     if None in units or not units:
         units = [None, None]
     if units[0] != units[-2 if columns == 3 else 0]:
         raise InputError(f"{path}: its positions along x and y have two units; one was expected")
     return _positions(path, table, units[0], units[-1])
-
-
-def _name(columns: Sequence[MeasuredColumn], axes: str) -> bool:
-    """Return True if columns have the names of all axes."""
-    return sorted(column.name.lower() for column in columns) == list(axes)
 
 
 def _table(path: Path, rows: Iterable[tuple[int, list[float]]], positions: bool) -> Array:
@@ -185,9 +180,8 @@ def _table(path: Path, rows: Iterable[tuple[int, list[float]]], positions: bool)
         numbers.append(number)
         values.append(np.array(row))
         if len(row) != len(values[0]):
-            raise InputError(
-                f"{path}:{number}: {len(row)} numbers; {len(values[0])} were expected, as in line {numbers[0]}"
-            )
+            wanted = f"{len(values[0])} were expected, as in line {numbers[0]}"
+            raise InputError(f"{path}:{number}: {len(row)} numbers; {wanted}")
     breaks = np.flatnonzero(np.diff(numbers) > 1)
     if not positions and 0 < breaks.size < len(values) - 1:  # text between all rows makes no blocks
         raise InputError(

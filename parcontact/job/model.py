@@ -121,9 +121,8 @@ class Job(Part):
         given = self.material.given
         of_fit = given.doubts if isinstance(given, Dma) else ()
         tests = meaning.ON_A_GRID if self.bands is None else meaning.IN_BANDS
-        of_effects = (
-            each if isinstance(each, Doubt) else SAID("", {"text": str(each)}) for each in self._said("doubts")
-        )
+        said = self._said("doubts")
+        of_effects = (each if isinstance(each, Doubt) else SAID("", {"text": str(each)}) for each in said)
         return (*of_fit, *(doubt for test in tests for doubt in test(self)), *of_effects)
 
     @property
@@ -214,19 +213,14 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
         fields["history"] = (tuple[stage, ...], Job.model_fields["history"])  # type: ignore[valid-type]
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
     every = ((name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ()))
-    own: Iterator[Any] = (
-        _named_rule(name, rule) for name, rule in every if made.model_fields.keys() >= set(rule.needs)
-    )
+    own = [_named_rule(name, rule) for name, rule in every if made.model_fields.keys() >= set(rule.needs)]
     laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
-    single = (limits.refuse_bands_over_time(name) for name, effect in effects.items() if not _in_bands(effect))
+    on_a_grid = (name for name, effect in effects.items() if not getattr(effect, "in_bands_over_time", False))
+    single = map(limits.refuse_bands_over_time, on_a_grid)
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)
     made.rules = (*kept, *laws, *single, *own)
     return made
-
-
-def _in_bands(effect: Any) -> bool:
-    return bool(getattr(effect, "in_bands_over_time", False))
 
 
 def _named_rule(section: str, rule: Rule) -> Rule:
@@ -254,12 +248,11 @@ def prepared(data: dict[str, Any]) -> dict[str, Any]:
     if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
         data["surface"] = surfaces.with_shapes(data["surface"])
     if isinstance(data.get("history"), list):
-        data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
+        data["history"] = list(data["history"])
+        for index, stage in enumerate(data["history"]):
+            if isinstance(stage, dict) and stage.get("name") is None:
+                data["history"][index] = {**stage, "name": f"stage {index + 1}"}
     return data
-
-
-def _named(stage: Any, index: int) -> Any:
-    return {**stage, "name": f"stage {index + 1}"} if isinstance(stage, dict) and stage.get("name") is None else stage
 
 
 def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:

@@ -14,6 +14,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -63,11 +64,12 @@ class Setting(NamedTuple):
 Axis = list[tuple[Setting, ...]]  # of one mapping: for each of its values, the settings of all its keys
 
 
+@dataclass(frozen=True)
 class Sweep:
     """The mappings of a sweep; an empty list for a job without a sweep."""
 
-    def __init__(self, axes: list[Axis], place: Place) -> None:
-        self.axes, self.place = axes, place
+    axes: list[Axis]
+    place: Place
 
     def __len__(self) -> int:
         """Return the number of cases; 0 if the job has no sweep."""
@@ -428,13 +430,13 @@ def _read(
     source, included, sweep = read_job(path, changes, index, source_of(given) if from_python else None)
     if source.data is UNREADABLE:
         return None, source.mistakes, sweep
-    output = source.data.get("output") if isinstance(source.data, dict) else None
+    data = source.data if isinstance(source.data, dict) else {}
+    output, stages = data.get("output"), data.get("history")
     names_directory = isinstance(output, dict) and output.get("directory") is not None
     texts = from_python or isinstance(overrides, Mapping)
     origin = Origin(path.absolute(), included, not from_python, texts, names_directory)
-    stages = source.data.get("history") if isinstance(source.data, dict) else None
-    count = len(stages) if isinstance(stages, list) else 0
-    written = tuple(str(source.locate(("history", index, "approach")).place) for index in range(count))
+    keys = [("history", index, "approach") for index in range(len(stages) if isinstance(stages, list) else 0)]
+    written = tuple(str(source.locate(key).place) for key in keys)
     strict = str(source.locate(("numerics", "strict")).place)
     origin = fill_grid(source, origin)._replace(approaches=written, strict=strict)
     try:

@@ -310,9 +310,7 @@ class Topography(Part):
 
     def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
         """Return the size [m] that the job gives for a map with `points` along x and y; None if it gives none."""
-        if self.pixel is None:
-            return self.size
-        return self.pixel[0] * points[0], self.pixel[1] * points[1]
+        return (self.pixel[0] * points[0], self.pixel[1] * points[1]) if self.pixel else self.size
 
 
 class Flat(Part):
