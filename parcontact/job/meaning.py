@@ -16,7 +16,7 @@ from ..rubber.shift import doubt_kelvin
 from . import limits
 from .advice import Sections, doubts_of_resolution
 from .calculation import Grid
-from .materials import Elastic, PronyBranch, Zener
+from .materials import Elastic, PronyBranch, Zener, heated
 from .stages import Stage, Swing
 from .surfaces import (
     Cone,
@@ -256,10 +256,13 @@ def _band(job: Sections) -> Iterator[Doubt]:
     speeds = [stage.speed for stage in job.history if stage.slides and stage.seconds]
     speeds += [math.hypot(*job.initial.velocity)] if any(job.initial.velocity) else []
     speeds += job.steady.velocities if job.steady else ()
-    if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
-        return  # relaxation times are given at another temperature
+    if not (times and lengths and speeds):
+        return
+    degrees = (job.steady.temperatures if job.steady else None) or ()
+    factors = [heated(material, value).time_factor for value in degrees]
+    factors += [material.time_factor] if job.history or not degrees else []
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
-    slow, fast = 1.0 / max(times), 1.0 / min(times)
+    slow, fast = 1.0 / (max(factors) * max(times)), 1.0 / (min(factors) * min(times))
     if (high * BEYOND < slow and not job.sheared_first) or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
         rates = {"low": low, "high": high, "slow": slow, "fast": fast}

@@ -80,6 +80,21 @@ def test_absurd_jobs_are_stated(job: Job, words: list[str], monkeypatch: pytest.
     assert len(found) == 1, job.warnings
 
 
+def test_branches_relax_at_the_temperatures_of_the_job() -> None:
+    """A slide at 250 to 500 rad/s is near the 1000 rad/s of the branch at 20 C. At -50 C, log10 a_T is 3e5/(R ln 10)
+    (1/223.15 - 1/293.15) = 16.8, and the slide far too fast; a curve at both temperatures is not too fast at one."""
+    shift = {"law": "arrhenius", "energy": 3e5, "reference": 20}
+    slide = [{**PRESS, "velocity": 0.01, "distance": 1e-4}]
+    for temperature, stated in ((20.0, False), (-50.0, True)):
+        rubber = {**ZENER, "shift": shift, "temperature": temperature}
+        texts = job_of(ROUGH, slide, material=rubber).warnings
+        assert any("times faster than the branches" in text for text in texts) == stated
+    curve = {"velocities": [0.01], "pressures": [1e4]}
+    for temperatures, stated in (([-50.0], True), ([-50.0, 20.0], False)):
+        job = job_of(ROUGH, [], material={**ZENER, "shift": shift}, steady={**curve, "temperatures": temperatures})
+        assert any("times faster than the branches" in text for text in job.warnings) == stated
+
+
 def test_slow_shear_of_a_contact_that_sticks_is_not_slow_sliding() -> None:
     """It is sheared within far less than a wave. Fast sliding gives the warning with stick, too."""
     for velocity, stated in ((1e-9, [False, True]), (1e9, [True, True])):
