@@ -246,7 +246,8 @@ def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:
                 found = _few_cells(shape.short_wavelength, grid, numerics.asked, job.directions)
                 yield from (WARN_FEW_CELLS(f"surface.{index}", numbers) for numbers in found)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
-    times = [branch.relaxation_time for branch in job.material.fitted.branches]
+    material = job.material.fitted
+    times = [material.time_factor * branch.relaxation_time for branch in material.branches]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
     for index, stage in enumerate(job.history):
         yield from _steps(index, stage, grid, shortest if numerics.integrator == "backward-euler" else math.inf, short)

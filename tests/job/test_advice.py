@@ -54,6 +54,9 @@ def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
     assert "time steps of up to 0.2 s exceed the shortest relaxation time, 0.001 s" in warning
     assert job_of(tmp_path, text).warnings == ()
     assert job_of(tmp_path, text, "numerics.integrator=backward-euler", "history.0.time_step=1e-3").warnings == ()
+    shift = "material.shift={law: factors, temperatures: [0, 20], logs: [3, 0], reference: 20}"
+    cold = job_of(tmp_path, text, "numerics.integrator=backward-euler", shift, "material.temperature=0")
+    assert cold.warnings == ()  # the shortest time is 1 s there
 
 
 def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
