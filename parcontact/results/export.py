@@ -6,9 +6,10 @@ frequencies or temperatures there. Effects export tables of runs.
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
@@ -17,16 +18,21 @@ from ..errors import InputError
 from ..files import files, hdf5, tables
 from ..files.provenance import PROGRAM
 from ..files.tables import Wanted
-from ..job import Job, load
+from ..job import load
 from ..job.listing import answers
 from ..march.measured_range import doubt_band
+from ..printed import quantity
 from .results import ExportedTable, Results
 
 HEAD = ("friction [-]", "slip rate [m/s]", "pressure [Pa]", "temperature [deg C]", "relative error [-]")
 SUFFIX = {"csv": ".csv", "abaqus": ".inp"}
 WIDTH = 76  # letters in a line of a comment
-SHOWN = 4  # tuning: most points of one reason in a sentence
 OUTSIDE = ("frequencies", "temperatures")  # kinds of warnings for which a point is left out
+OUT_OF_RANGE = "outside of its measured range"
+BY_SHIFT = (
+    ", as reduced to the reference temperature: at these frequencies, or at temperatures whose shift reaches them",
+    ", or at several temperatures and give material.shift",
+)  # how to measure them with a shift, and without one
 
 
 def export_results(directory: Path, form: str, out: Path | None = None) -> Iterator[str]:
@@ -75,43 +81,64 @@ def _friction(directory: Path) -> ExportedTable:
             error = columns.get("error_friction", [math.nan] * len(points))[k]
             speed, pressure = (float(f"{value:.9g}") for value in point[:2])  # without rounding errors
             rows.append((columns["friction"][k], speed, pressure, degrees, error))
+    left_out = list(_name_outside(outside, len(points), given))
     if not rows:
-        raise InputError(f"{directory}: no point of the curve lies within the measured range of the rubber")
+        none = f"{directory}: no point of the curve lies within the measured range of the rubber"
+        raise InputError("; ".join([none, *left_out[1:]]))
     rows.sort(key=lambda row: (row[3] if row[3] == row[3] else 0.0, *row[2:0:-1]))
     missing = [f"not solved: {text}" for text in curve.unfinished]
-    return ExportedTable("friction", HEAD, rows, [*_name_outside(outside, len(points)), *missing])
+    return ExportedTable("friction", HEAD, rows, [*left_out, *missing])
 
 
-def _outside(directory: Path, points: Sequence[Wanted]) -> dict[Wanted, str]:
-    """Return the points at which the rubber is excited outside of its measured range, with the reason."""
-    path = Results(directory, "steady").job_file
+def _outside(directory: Path, points: Sequence[Wanted]) -> dict[Wanted, Doubt]:
+    """Return the points at which the rubber is excited outside of its measured range, each with the first reason."""
+    path, found = Results(directory, "steady").job_file, dict[Wanted, Doubt]()
     try:
         job = load(path) if path else None
         job = on_one_grid_of_all(job, cut_bands(job)) if job and job.bands is not None else job
     except InputError:  # its files no longer exist
-        job = None
-    found = {}
-    for point in points if job and job.steady else ():
-        doubts = [str(doubt) for doubt in _doubts(job, point) if doubt.kind in OUTSIDE] if job else []
-        if doubts:
-            found[point] = doubts[0].partition("; ")[0]
+        return found
+    if job is None or job.steady is None:
+        return found
+    for point in points:
+        degrees = () if math.isnan(point.temperature) else (point.temperature,)
+        state = {"velocities": (point.speed,), "pressures": (point.pressure,), "temperatures": degrees or None}
+        changed = job.model_copy(update={"steady": job.steady.model_copy(update=state), "history": ()})
+        if doubt := next((one for one in doubt_band(changed, degrees) if one.kind in OUTSIDE), None):
+            found[point] = doubt
     return found
 
 
-def _doubts(job: Job, point: Wanted) -> Iterator[Doubt]:
-    """Yield warnings about the rubber in one state of steady sliding."""
-    degrees = None if math.isnan(point.temperature) else (point.temperature,)
-    state = {"velocities": (point.speed,), "pressures": (point.pressure,), "temperatures": degrees}
-    steady = job.steady.model_copy(update=state) if job.steady else None
-    yield from doubt_band(job.model_copy(update={"steady": steady, "history": ()}), degrees or ())
+def _name_outside(outside: Mapping[Wanted, Doubt], count: int, given: float) -> Iterator[str]:
+    """Yield sentences on the points that are left out, those of one temperature and reason together, with the needed
+    and the measured frequencies, and on how to keep the points. The rubber's own temperature is `given` [deg C]; NaN if
+    it has no shift."""
+    groups: dict[tuple[str, Any], list[Wanted]] = {}
+    for point, doubt in outside.items():
+        degrees = given if math.isnan(point.temperature) else point.temperature
+        at = "" if math.isnan(degrees) else f" at {degrees:g} C"
+        groups.setdefault((at, doubt.numbers.get("side")), []).append(point)
+    if groups:
+        yield f"left out: {len(outside)} of {count} points, at which the surface excites the rubber {OUT_OF_RANGE}"
+    ends: list[Any] = []
+    for (at, side), points in sorted(groups.items(), key=str):
+        speeds = [quantity(end.speed, "m/s") for end in (min(points), max(points))]
+        who = f"{' to '.join(dict.fromkeys(speeds))}{at} ({len(points)} point{'s' * (len(points) > 1)})"
+        first, *_ = numbers = [dict[str, Any](outside[one].numbers) for one in points]
+        if side is None:  # a temperature
+            yield f"{who}: {outside[points[0]].body.partition(':')[0]}"
+            continue
+        own = [each[end] for each in numbers for end in ("low", "high")]
+        far = f"{max(each['decades'] for each in numbers):.1f} decades {side}"
+        measured = f"{first['first']:.3g} to {first['last']:.3g} Hz"
+        yield f"{who} needs moduli at {_range(own)} Hz, {far} the measured {measured}"
+        ends += own
+    if ends:
+        yield f"to keep these points, measure the moduli from {_range(ends)} Hz{BY_SHIFT[math.isnan(given)]}"
 
 
-def _name_outside(outside: dict[Wanted, str], count: int) -> Iterator[str]:
-    if outside:
-        more = [f"and {len(outside) - SHOWN} more"] * (len(outside) > SHOWN)
-        named = "; ".join([*map(str, list(outside)[:SHOWN]), *more])
-        yield f"left out, {len(outside)} of {count} points outside of the measured range of the rubber: {named}"
-        yield f"the first of them: {next(iter(outside.values()))}"
+def _range(values: Sequence[float]) -> str:
+    return " to ".join(dict.fromkeys(f"{end:.3g}" for end in (min(values), max(values))))
 
 
 def _to_abaqus(table: ExportedTable) -> str:

@@ -47,8 +47,31 @@ def test_a_table_for_abaqus(curve: Path) -> None:
     wanted = {(v, p, t) for v, p, t in product((0.1, 1.0, 10.0), (1e5, 2e5), (20.0, 40.0))} - {(10.0, 2e5, 40.0)}
     reduced = {point: point[0] / 1e-3 * (SHARE if point[2] == 40.0 else 1.0) for point in wanted}
     assert {row[1:] for row in rows} == {point for point, frequency in reduced.items() if 25.0 < frequency < 6000.0}
-    assert "points outside of the measured range of the rubber: " in said[1]
+    low = f"{100 * SHARE:.3g}"
+    assert said[1:5] == [
+        "left out: 4 of 11 points, at which the surface excites the rubber outside of its measured range",
+        "10 m/s at 20 C (2 points) needs moduli at 1e+04 Hz, 0.5 decades above the measured 50 to 3e+03 Hz",
+        f"100 mm/s at 40 C (2 points) needs moduli at {low} Hz, 1.2 decades below the measured 50 to 3e+03 Hz",
+        f"to keep these points, measure the moduli from {low} to 1e+04 Hz, as reduced to the reference temperature: at "
+        "these frequencies, or at temperatures whose shift reaches them",
+    ]
     assert "not solved: 1 of 12 points are not solved yet" in said
+
+
+def test_points_left_out_without_a_shift(tmp_path: Path) -> None:
+    """Waves of 1 mm at 10 and 100 m/s excite 10 and 100 kHz, and 3 kHz were measured."""
+    shift = "\n  shift: {law: wlf, C1: 8.86, C2: 101.6, reference: 20}"
+    text = JOB.replace(f",{shift}", "").replace(", temperatures: [20, 40]", "").replace("[0.1, 1.0, 10]", "[10, 100]")
+    (tmp_path / "job.yaml").write_text(text)
+    (tmp_path / "steady.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    (tmp_path / "steady.csv").write_text(
+        "velocity,pressure,friction\n10,1e5,0.1\n100,1e5,0.2\n10,2e5,0.1\n100,2e5,0.2\n"
+    )
+    with pytest.raises(InputError, match="no point of the curve lies within the measured range") as error:
+        list(export.export_results(tmp_path, "abaqus"))
+    said = str(error.value)
+    assert "10 m/s to 100 m/s (4 points) needs moduli at 1e+04 to 1e+05 Hz, 1.5 decades above the measured" in said
+    assert "measure the moduli from 1e+04 to 1e+05 Hz, or at several temperatures and give material.shift" in said
 
 
 def test_a_table_with_units(curve: Path) -> None:
