@@ -267,11 +267,11 @@ WARN_FEW_LONG_WAVES = Kind(
 
 
 def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
-    name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
-    if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
-        enough = {"size": LONG_WAVES * shape.long_wavelength, "wave": length / LONG_WAVES}
-        numbers = {"waves": length / shape.long_wavelength, "axis": name, "least": LONG_WAVES, **enough}
-        yield WARN_FEW_LONG_WAVES(f"surface.{index}", numbers)
+    longest = dict(zip("xy", shape.longest, strict=True))
+    count, axis = min((length / longest[name], name) for name, length, _ in _directions(grid))
+    if count < LONG_WAVES * (1 - SAME_LENGTH):
+        enough = {"size": LONG_WAVES * longest[axis], "wave": count / LONG_WAVES * shape.long_wavelength}
+        yield WARN_FEW_LONG_WAVES(f"surface.{index}", {"waves": count, "axis": axis, "least": LONG_WAVES, **enough})
 
 
 WARN_LARGE_BOX = Kind(
@@ -386,10 +386,11 @@ def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
 
     The scatter falls with the square root of the number of longest waves in the box.
     """
-    longest = max((shape.long_wavelength for shape in surface if isinstance(shape, Rough)), default=0.0)
-    if not longest:
+    rough = [shape.longest for shape in surface if isinstance(shape, Rough)]
+    if not rough:
         return ""
-    counts = [max(length / longest, 1.0) for _, length, _ in _directions(grid)]
+    longest = dict(zip("xy", map(max, zip(*rough, strict=True)), strict=True))
+    counts = [max(length / longest[name], 1.0) for name, length, _ in _directions(grid)]
     root = math.sqrt(math.prod(counts))
     friction = f"friction by about {per_cent(SEED_FRICTION / root)} and " if slides else ""
     return (

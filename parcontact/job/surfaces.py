@@ -174,6 +174,13 @@ class Rough(Part):
     one_of = (("rms_slope", "rms_height", "psd_constant"),)
     rules = (_ordered("rolloff_wavelength", "long_wavelength"), _ordered("short_wavelength", "rolloff_wavelength"))
 
+    @property
+    def longest(self) -> tuple[float, float]:
+        """Return the longest wavelengths along x and along y [m]."""
+        ratio, angle = (self.anisotropy.ratio, math.radians(self.anisotropy.angle)) if self.anisotropy else (1.0, 0.0)
+        x, y = math.cos(angle), math.sin(angle)
+        return math.hypot(ratio * x, y) * self.long_wavelength, math.hypot(x, ratio * y) * self.long_wavelength
+
 
 class RoughSpectrum(Part):
     """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or `q[1/m]

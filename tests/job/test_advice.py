@@ -23,6 +23,16 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     assert "128 points (2.9 times the memory, about 5.7 times the time in sliding)" in short
 
 
+def test_the_longest_waves_of_an_anisotropic_surface_are_those_along_its_lay(tmp_path: Path) -> None:
+    """They are four times as long as those across, of which four fit into the box of 1 mm."""
+    rough = ROUGH.replace("5e-4", "2.5e-4").replace("6.25e-5", "1.25e-4")
+    for angle, axis in ((0, "x"), (90, "y")):
+        text = replaced(SMALL, surface=rough.replace("}", f", anisotropy: {{ratio: 4, angle: {angle}}}}}"))
+        (warning,) = job_of(tmp_path, text).warnings
+        assert f"only 1 of the longest waves fit into the box along {axis}" in warning
+        assert "use a grid.size of 0.004 m or a long_wavelength of 6.25e-05 m" in warning
+
+
 def test_where_nothing_slides_friction_asks_for_no_cells(tmp_path: Path) -> None:
     """Its accuracy is of no meaning there: 4 cells do for an error of the area of 3 %, 8 (1/3)^(1/1.6)."""
     strict = replaced(SMALL, surface=ROUGH, numerics="{accuracy: {friction: 0.001, area: 0.031}}")
