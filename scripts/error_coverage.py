@@ -126,7 +126,10 @@ def _march(job: Job) -> Json:
     runs.marched(march, note)
     box = job.grid.lx * job.grid.ly
     found = {"rows": rows, "run": properties, "box": box, "tolerance": job.numerics.tolerance}
-    return found if job.section("adhesion") is None else {**found, "coarseness": section.cell_over_zone(job)}
+    if job.section("adhesion") is None:
+        return found
+    law = section.law_of(job)
+    return {**found, "coarseness": law.cell / law.zone}
 
 
 def _steady(job: Job) -> Json:

@@ -25,7 +25,7 @@ import numpy as np
 import runs
 from numpy.typing import NDArray
 
-from parcontact.effects.adhesion.section import adhesion_law
+from parcontact.effects.adhesion.section import law_of
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March
@@ -109,8 +109,7 @@ def history(random: Random, height: float, top: float, size: float, modulus: flo
 def violations(march: March, before: float) -> Iterator[str]:
     """Yield violations after a step; `before` is the energy lost in snaps before it [J]."""
     row, gap, p = march.row, march.field("gap"), march.field("pressure")
-    law = adhesion_law(march.scene.job.section("adhesion"), march.scene.job.grid, march.scene.job.material)
-    assert law is not None
+    law = law_of(march.scene.job)
     surfaces, lost = row.added[2], row.added[3]
     if gap.min() < 0.0:
         yield f"a gap of {gap.min():g} m"

@@ -29,7 +29,7 @@ from parcontact.door.study import (
     make_cases,
     overrides,
 )
-from parcontact.effects.adhesion.section import adhesion_law
+from parcontact.effects.adhesion.section import law_of
 from parcontact.errors import InputError
 from parcontact.files import run as runner
 from parcontact.files.stopping import Options
@@ -412,8 +412,7 @@ def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reac
     job, found = refined(path, "{mesh: [32, 64, 128]}")
     cases = [load_job(path, overrides(job, found.own, case)) for case in found.combine()]
     assert {case.grid.nx for case in cases} == {32, 64, 128}
-    attractions = {adhesion_law(case.section("adhesion"), case.grid, case.material) for case in cases}
-    assert attractions == {adhesion_law(job.section("adhesion"), job.grid, job.material)}
+    assert {law_of(case).range for case in cases} == {law_of(job).range}
     stated = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
     assert [text.startswith(stated) for text in describe_choices(job)] == [True] * held
 

@@ -34,7 +34,7 @@ from ...physics.measures import SIDE, Certificate, Measures
 from ...physics.motion import cells_between
 from ..effect import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, end_in, entries_of_end, nothing_holds
 from .gap_solver import DUGDALE, EXPONENTIAL, SHARPER, GapOperators, GapSolution, GapSolver, Law, surface_energy
-from .section import adhesion_law, cell_of, modulus_of
+from .section import law_of
 
 
 class PathWork:
@@ -321,9 +321,7 @@ class AdhesiveLaw:
         self.solver = AdhesiveSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
         self.scene, self.slab, self.grid = scene, setup.slab, scene.choices.grid
         self._goes_on_open = scene.job.section("adhesion").detached == "open"
-        law = adhesion_law(scene.job.section("adhesion"), scene.job.grid, scene.job.material)
-        assert law is not None
-        self._attraction = law
+        self._attraction = law_of(scene.job)
 
     def law(self, alpha: float) -> Law:
         """Return the attraction in a step with the modulus alpha, in the units of the solver."""
@@ -422,8 +420,8 @@ class AdhesiveLaw:
         sides = excess * self.slab.points / SIDE
         if sides <= 0.0:
             return EdgeMotion(begins=begins)
-        moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * cell_of(self.grid)
-        zone = self._attraction.process_zone(modulus_of(self.scene.job.material))
+        moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * self._attraction.cell
+        zone = self._attraction.zone
         return EdgeMotion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
 
     def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:

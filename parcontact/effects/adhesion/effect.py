@@ -43,20 +43,9 @@ from ..effect import (
     Effect,
     Instant,
 )
-from .section import (
-    AUTO,
-    Adhesion,
-    adhesion_law,
-    cell_of,
-    chosen_range,
-    doubt_range,
-    doubts_of_adhesion,
-    modulus_of,
-    smallest_range,
-)
+from .section import AUTO, SAME, Adhesion, adhesion_law, chosen_range, doubt_range, doubts_of_adhesion, law_of
 
 MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
-SAME = 1e-9  # rounding: relative tolerance on a range
 JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter above and below which these theories hold
 FULL_CONTACT = 0.56988  # physics: least Johnson's parameter for full contact of a wave without load
 LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
@@ -79,37 +68,14 @@ def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any, bands
         return
     if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
         return
-    cell, modulus = cell_of(grid), modulus_of(material)
-    least = smallest_range(adhesion.work, modulus, cell, 1.0 / MOST_CELLS)
-    if float(adhesion.range) < least * (1.0 - SAME):
+    law = adhesion_law(adhesion, grid, material)
+    least = law.range_for(1.0 / MOST_CELLS)
+    if law.range < least * (1.0 - SAME):
         sentence = (
-            f"must be at least {least:.3g} m for a viscoelastic body on cells of {cell:.3g} m, got {adhesion.range:g}: "
+            f"must be at least {least:.3g} m for a viscoelastic body on cells of {law.cell:.3g} m, got {law.range:g}: "
             f"with less the mesh pins the edges of contact, and the rate of pulling has no meaning"
         )
         yield Fault(sentence, ("adhesion", "range"))
-
-
-def _facts(job: Any) -> Iterator[str]:
-    law, modulus, cell = adhesion_law(job.adhesion, job.grid, job.material), modulus_of(job.material), cell_of(job.grid)
-    assert law is not None
-    if modulus == 0.0:
-        yield "adhesion: a body without long-term modulus has no process zone of its own"
-        return
-    zone = law.process_zone(modulus)
-    yield (
-        f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {zone:.4g} m, "
-        f"cell h = {cell / zone:.3g} l; rates are velocity times relaxation time over l"
-    )
-    at_once = float(2.0 * job.material.fitted.instant_modulus / (1.0 - job.material.poisson))
-    for index, shape in enumerate(job.surface):
-        if isinstance(shape, Sphere):
-            slow, fast = law.tabor(modulus, shape.radius), law.tabor(at_once, shape.radius)
-            yield f"surface.{index}: Tabor's parameter {slow:.3g}{_also(slow, fast)}: {_kind(slow)}"
-        elif isinstance(shape, Wave) and any(shape.waves) and shape.amplitude:
-            length = 1.0 / math.hypot(*(count / size for count, size in zip(shape.waves, job.grid.size, strict=True)))
-            slow, fast = (law.johnson(each, length, shape.amplitude) for each in (modulus, at_once))
-            full = "full contact without load" if slow > FULL_CONTACT else "no full contact without load"
-            yield f"surface.{index}: Johnson's parameter {slow:.3g}{_also(slow, fast)}: {full}"
 
 
 def _also(slow: float, fast: float) -> str:
@@ -194,12 +160,6 @@ WARN_RANGE_FOLLOWS_CELLS = Kind(
     "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
     "different physics; to compare them give all one range: {most:.4g} m is resolved by the cells of each",
 )
-WARN_COARSE_PROCESS_ZONE = Kind(
-    "coarse process zone",
-    "a cell, {cell:.3g} m, is {ratio:.2g} times as long as the process zone, so the forces at edges of contact are "
-    "not resolved: pull-off is wrong by 4 % at 1.2 times and by 23 % at 1.8 times; use a range of {enough!u} m "
-    "or more, or cells of {zone!d} m",
-)
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
@@ -234,9 +194,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
-        law = adhesion_law(job.adhesion, job.grid, job.material)
-        assert law is not None
-        yield from doubt_range(job, law, span)
+        return doubt_range(job, span)
 
     @staticmethod
     def doubt_cases(jobs: Sequence[Any]) -> Iterator[Doubt]:
@@ -256,30 +214,37 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        section: Adhesion | None = job.section("adhesion")
-        if section is None:
+        if job.section("adhesion") is None:
             return Decision("adhesion", False, "there is no adhesion section")
-        law = adhesion_law(section, job.grid, job.material)
-        assert law is not None
+        law = law_of(job)
         return Decision("adhesion", True, f"{law.work:g} J/m^2 over a range of {law.range:.4g} m ({law.kind})")
 
     @staticmethod
     def doubts(job: Any) -> Iterator[Doubt]:
-        """Yield warnings about physically implausible values, and about a mesh that does not resolve the attraction."""
-        law = adhesion_law(job.adhesion, job.grid, job.material)
-        assert law is not None
-        modulus, cell = modulus_of(job.material), cell_of(job.grid)
-        zone = law.process_zone(modulus)
-        yield from doubts_of_adhesion(job, law, modulus, cell)
-        if 0.0 < zone < cell * (1.0 - SAME):
-            least = smallest_range(law.work, modulus, cell, 1.0)
-            numbers = {"cell": cell, "ratio": cell / zone, "enough": least, "zone": zone}
-            yield WARN_COARSE_PROCESS_ZONE("adhesion", numbers)
+        return doubts_of_adhesion(job)
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
         """Yield sentences on the process zone and on Tabor's and Johnson's parameters."""
-        yield from _facts(job)
+        law = law_of(job)
+        if law.modulus == 0.0:
+            yield "adhesion: a body without long-term modulus has no process zone of its own"
+            return
+        yield (
+            f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {law.zone:.4g} m, "
+            f"cell h = {law.cell / law.zone:.3g} l; rates are velocity times relaxation time over l"
+        )
+        at_once = float(2.0 * job.material.fitted.instant_modulus / (1.0 - job.material.poisson))
+        for index, shape in enumerate(job.surface):
+            if isinstance(shape, Sphere):
+                slow, fast = law.tabor(law.modulus, shape.radius), law.tabor(at_once, shape.radius)
+                yield f"surface.{index}: Tabor's parameter {slow:.3g}{_also(slow, fast)}: {_kind(slow)}"
+            elif isinstance(shape, Wave) and any(shape.waves) and shape.amplitude:
+                sides = zip(shape.waves, job.grid.size, strict=True)
+                length = 1.0 / math.hypot(*(count / size for count, size in sides))
+                slow, fast = (law.johnson(each, length, shape.amplitude) for each in (law.modulus, at_once))
+                full = "full contact without load" if slow > FULL_CONTACT else "no full contact without load"
+                yield f"surface.{index}: Johnson's parameter {slow:.3g}{_also(slow, fast)}: {full}"
 
     def __init__(self, scene: Any) -> None:
         self._scene, self._area = scene, scene.choices.grid.lx * scene.choices.grid.ly

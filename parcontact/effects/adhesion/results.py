@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ...march.constants import PULL_OFF, Fit
 from ...printed import quantity
 from ...results.results import Results
-from .section import cell_over_zone
+from .section import law_of
 
 ZONE = Fit(
     "pull-off: times a power of the cell over the process zone",
@@ -139,7 +139,8 @@ def _pulls(run: Results) -> list[PullOff]:
     """Return the pull-offs of a run; none if its job has no adhesion."""
     if run.job is None or run.job.section("adhesion") is None:
         return []
-    return find(run.table, bool(run.detached), cell_over_zone(run.job))
+    law = law_of(run.job)
+    return find(run.table, bool(run.detached), law.cell / law.zone if law.zone else math.nan)
 
 
 def sentences(run: Results) -> Iterator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, advance_energies
-from parcontact.effects.adhesion.section import adhesion_law
+from parcontact.effects.adhesion.section import law_of
 from parcontact.effects.effect import SolvedContact
 from parcontact.errors import InputError
 from parcontact.files.sweep_warnings import sentences_of
@@ -71,9 +71,8 @@ def test_loads_may_pull() -> None:
 def test_the_range_that_the_mesh_resolves() -> None:
     """Two cells are one process zone, `l = E* rho^2/w`."""
     auto = job(adhesion={"work": 0.05})
-    law = adhesion_law(auto.section("adhesion"), auto.grid, auto.material)
-    assert law is not None
-    assert law.process_zone(E) == pytest.approx(2 * 4e-4 / 64, rel=1e-12)
+    law = law_of(auto)
+    assert law.zone == pytest.approx(2 * 4e-4 / 64, rel=1e-12)
 
 
 @pytest.mark.parametrize(
