@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from parcontact.contact.problem import Approach
-from parcontact.effects.adhesion.gap_solver import EXPONENTIAL, GapOperators, GapSolution, GapSolver, Law
+from parcontact.effects.adhesion.gap_solver import EXPONENTIAL, GapOperators, GapProblem, GapSolution, GapSolver, Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -41,7 +41,8 @@ class Sticky:
 
     def solve(self, tolerance: float) -> GapSolution:
         start = np.full(self.slab.shape, self.mean_gap)
-        return self.solver.solve(self.law, self.heights, Approach(-self.mean_gap), start, tolerance)
+        problem = GapProblem(self.law, self.heights, Approach(-self.mean_gap))
+        return self.solver.solve(problem, start, tolerance)
 
 
 def adhesion(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,26 +34,18 @@ from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import SIDE, Certificate, Measures
 from ...physics.motion import cells_between
 from ..effect import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, end_in, entries_of_end, nothing_holds
-from .gap_solver import DUGDALE, EXPONENTIAL, SHARPER, GapOperators, GapSolution, GapSolver, Law, surface_energy
+from .gap_solver import (
+    DUGDALE,
+    EXPONENTIAL,
+    SHARPER,
+    GapOperators,
+    GapProblem,
+    GapSolution,
+    GapSolver,
+    Law,
+    surface_energy,
+)
 from .section import law_of
-
-
-class PathWork:
-    """Work of the load along its path by the trapezoidal rule, for a body of modulus 1, in the scene's unit of energy;
-    0 if the job asks for no energies."""
-
-    def __init__(self, scene: Any, approach: float, pressure: float) -> None:
-        self.scene, self.approach, self.pressure, self.total = scene, approach, pressure, 0.0
-
-    def add(self, contact: Contact) -> None:
-        """Add the work between the last contact and this one; collective."""
-        if (energy := self.scene.energy) is None:
-            return
-        pressure = self.scene.slab.sum(float(contact.p.sum()))[0] / self.scene.slab.points
-        mean, way = 0.5 * (self.pressure + pressure), contact.d - self.approach
-        self.total += energy.unit * self.scene.slab.points * mean * way
-        self.approach, self.pressure = contact.d, pressure
-
 
 MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
@@ -120,54 +113,41 @@ class AdhesiveSolver:
     free: Operator | None = None
 
     def solve(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array | None,
-        out: Array,
-        loose: float = 1.0,
+        self, problem: GapProblem, gap: Array, free_correction: Array | None, out: Array, loose: float = 1.0
     ) -> tuple[Contact, bool]:
         """Solve from the map `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
 
         `free_correction` is `(A - B) p` of a free body and is updated. `loose` multiplies the tolerance. Return the
-        contact, and True if the surfaces have detached.
+        contact, whose displacement is in the workspace, and True if the surfaces have detached.
         """
-        tolerance = loose * self.tolerance
+        tolerance, u = loose * self.tolerance, self.workspace.displacement
         if self.free is None or free_correction is None:
-            found = self.gaps.solve(law, heights, control, gap, tolerance)
+            found = self.gaps.solve(problem, gap, tolerance)
+            iterations = found.iterations
             out[...] = found.p
-            u = self.workspace.displacement
-            np.add(gap, heights, out=u)
+            np.add(gap, problem.heights, out=u)
             u += found.d
-            return self._contact(found, out, found.iterations), found.detached
-        start = self.workspace.pressure
-        start[...] = gap
-        found, iterations = self._solve_fixed_point(law, heights, control, gap, free_correction, out, tolerance)
-        if found.failure:
-            gap[...] = start
-            found = self._solve_free(law, heights, control, gap, free_correction, out, tolerance)
-            iterations += found.iterations
-        return self._contact(found, out, iterations), found.detached
+        else:
+            start = self.workspace.pressure
+            start[...] = gap
+            found, iterations = self._solve_fixed_point(problem, gap, free_correction, out, tolerance)
+            if found.failure:
+                gap[...] = start
+                found = self._solve_free(problem, gap, free_correction, out, tolerance)
+                iterations += found.iterations
+        return Contact(out, u, found.d, found.certificate, iterations, found.failure), found.detached
 
     def _solve_fixed_point(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array,
-        out: Array,
-        tolerance: float,
+        self, problem: GapProblem, gap: Array, free_correction: Array, out: Array, tolerance: float
     ) -> tuple[GapSolution, int]:
         """Repeat the solve of a free body until `free_correction` is constant. Return the solution, with a failure if
         it does not settle, and the iterations of all passes; collective."""
         iterations, share, last = 0, 1.0, free_correction
         for passes in range(1, MAX_PASSES + 1):
-            found = self.gaps.solve(law, heights - free_correction, control, gap, tolerance)
+            lagged = problem._replace(heights=problem.heights - free_correction)
+            found = self.gaps.solve(lagged, gap, tolerance)
             iterations += found.iterations
-            found, change, worst = self._compare(heights, control, gap, found, out)
+            found, change, worst = self._compare(problem, gap, found, out)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change
             free_correction += share * change
@@ -178,30 +158,23 @@ class AdhesiveSolver:
         return replace(found, failure=UNSETTLED), iterations
 
     def _solve_free(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        free_correction: Array,
-        out: Array,
-        tolerance: float,
+        self, problem: GapProblem, gap: Array, free_correction: Array, out: Array, tolerance: float
     ) -> GapSolution:
         """Solve with the operator of the free body and update `free_correction`; collective."""
         assert self.free is not None
-        work, repeated = self.workspace, self.gaps.operators
+        work, repeated, (law, heights, control) = self.workspace, self.gaps.operators, problem
         maps = (work.pressure, work.displacement, work.other_displacement, free_correction)  # all in double precision
         inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
         operators = repeated._replace(operator=self.free, inverse=inverse)
         if isinstance(control, Approach):
             operators = operators._replace(mean=math.inf, least_mean=math.inf)
-            found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
-            found = replace(found, d=control.value)
+            moved = GapProblem(law, heights + control.value, Approach(0.0))
+            found = replace(self.gaps.solve(moved, gap, LEFT * tolerance, operators), d=control.value)
         else:
             work.displacement.fill(1.0)
             lifted = heights - control.value * self.free.apply(work.displacement, work.displacement)
-            found = self.gaps.solve(law, lifted, control, gap, LEFT * tolerance, operators)
-        found, _, worst = self._compare(heights, control, gap, found, out)
+            found = self.gaps.solve(GapProblem(law, lifted, control), gap, LEFT * tolerance, operators)
+        found, _, worst = self._compare(problem, gap, found, out)
         repeated.operator.apply(out, free_correction)
         np.subtract(work.displacement, free_correction, out=free_correction)
         if not found.failure and worst > tolerance:
@@ -210,27 +183,22 @@ class AdhesiveSolver:
         return found
 
     def _compare(
-        self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
+        self, problem: GapProblem, gap: Array, found: GapSolution, out: Array
     ) -> tuple[GapSolution, Array, float]:
         """Put the pressure into `out`; collective. Return the solution with its error on the free body in the
-        certificate, the displacement of the free body minus that of the solution, and the size of this difference."""
+        certificate, the displacement of the free body minus that of the solution, and the size of this difference
+        without a change of the approach."""
         assert self.free is not None
         out[...] = found.p
-        change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
+        change = self.free.apply(out, self.workspace.displacement) - (problem.heights + gap)
         change -= found.d
-        found, worst = self._judge(control, found, out, change)
-        return found, change, worst
-
-    def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
-        """Add the change of displacements in a pass to the certificate, except a change of the approach. Return the
-        solution and this error; collective."""
-        certificate, slab, weight = found.certificate, self.workspace.slab, np.abs(p)
+        certificate, slab, weight = found.certificate, self.workspace.slab, np.abs(out)
         load, sum_change = slab.sum(float(weight.sum()), float(np.vdot(weight, change)))
-        shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
+        shift = sum_change / load if isinstance(problem.control, MeanPressure) and load > 0.0 else 0.0
         (wrong,) = slab.sum(float(np.vdot(weight, np.abs(change - shift))))
         worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0
         certificate = replace(certificate, complementarity=max(certificate.complementarity, worst))
-        return replace(found, certificate=certificate, d=found.d + shift), worst
+        return replace(found, certificate=certificate, d=found.d + shift), change, worst
 
     def _share(self, share: float, p: Array, change: Array, last: Array) -> float:
         """Return the share of a change to make: Aitken's extrapolation of the last two, weighted by the pressure;
@@ -240,10 +208,6 @@ class AdhesiveSolver:
         along, size = self.workspace.slab.sum(along, float((weight * difference**2).sum()))
         wanted = -share * along / size if size > 0.0 else 1.0
         return min(max(wanted, LEAST_SHARE), MOST_SHARE)
-
-    def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
-        """Return the solution as a contact, whose displacement is in the workspace."""
-        return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)
 
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
@@ -300,12 +264,18 @@ class LoadPath:
 
 
 class _Walk(NamedTuple):
-    """Result of solving along the path of a load: contact, whether it is detached, work and whether it has snapped."""
+    """Result of solving along the path of a load: the last contact, True if it is `detached`, True if it has `snapped`,
+    and approaches and mean pressures of all equilibria on the path, in the run's units, if energies are requested."""
 
     contact: Contact
     detached: bool
-    work: float
     snapped: bool
+    equilibria: list[tuple[float, float]]
+
+    @property
+    def work(self) -> float:
+        """Mean work of the load per area along the path, by the trapezoidal rule."""
+        return sum(0.5 * (p + p_next) * (d_next - d) for (d, p), (d_next, p_next) in pairwise(self.equilibria))
 
 
 class AdhesiveLaw:
@@ -360,7 +330,7 @@ class AdhesiveLaw:
         if self.scene.energy is not None:
             sum_gamma = 0.0 if walk.detached else self.slab.sum(surface_energy(law, gap))[0]
             numbers["surface_energy"] = sum_gamma * trial.alpha * self.scene.energy.unit
-            numbers["work_of_load"] = walk.work * trial.alpha
+            numbers["work_of_load"] = walk.work * self.slab.points * trial.alpha * self.scene.energy.unit
             numbers["leaves_equilibrium"] = float(walk.detached or path.closes_gap_first)
         touching = law.touches(now.pasts[0].gap)
         pull = numbers["adhesive_force"]
@@ -381,13 +351,12 @@ class AdhesiveLaw:
         whole = JUMP_STRIDE if step.jump else 1.0
         self._start(memory, step, trial, path, gap, still=step.jump)
         reached, stride, iterations, backup, snapped = 0.0, whole, 0, memory.gap_backup, False
-        work = PathWork(self.scene, path.approach, path.pressure)
+        equilibria = [(path.approach, path.pressure)]
         while True:
             share = min(reached + stride, 1.0)
             loose = 1.0 if share == 1.0 else max(1.0, PART_TOLERANCE / self.scene.choices.numerics.tolerance)
-            contact, detached = self.solver.solve(
-                law, trial.effective, path.at(share), gap, correction, pressure, loose
-            )
+            problem = GapProblem(law, trial.effective, path.at(share))
+            contact, detached = self.solver.solve(problem, gap, correction, pressure, loose)
             iterations += contact.iterations
             hard = detached or (bool(contact.failure) and share == 1.0)
             if hard and stride > LEAST_STRIDE * whole:
@@ -397,11 +366,11 @@ class AdhesiveLaw:
                     gap[...] = backup
                 stride *= 0.5
                 continue
-            if not detached and not path.closes_gap_first:
-                work.add(contact)
+            if not (detached or path.closes_gap_first or self.scene.energy is None):
+                equilibria.append((contact.d, self.slab.sum(float(contact.p.sum()))[0] / self.slab.points))
             snapped |= hard and memory.pasts[0].known
             if detached or share == 1.0:
-                return _Walk(replace(contact, iterations=iterations), detached, work.total, snapped)
+                return _Walk(replace(contact, iterations=iterations), detached, snapped, equilibria)
             reached = share
             backup[...] = gap
 
@@ -430,9 +399,8 @@ class AdhesiveLaw:
         if isinstance(control, MeanPressure):
             closes = control.value >= 0.0 and before.contact_area == 0.0
             return LoadPath(0.0 if closes else pressure, control, past.approach, pressure, closes)
-        approach = (
-            past.approach if past.last.alpha else min(past.approach, control.value)
-        )  # the surfaces were not closer before
+        # before the first contact the surfaces were not closer
+        approach = past.approach if past.last.alpha else min(past.approach, control.value)
         return LoadPath(approach, control, approach, pressure)
 
     def _start(

@@ -325,6 +325,14 @@ class GapOperators(NamedTuple):
     least_mean: float
 
 
+class GapProblem(NamedTuple):
+    """Input of a solve: the law of attraction, the effective heights and the prescribed load."""
+
+    law: Law
+    heights: Array
+    control: Control
+
+
 @dataclass(frozen=True)
 class GapSolution:
     """A solved gap (in the map of the start) and its pressure (in a map of the solver, valid until the next solve).
@@ -414,17 +422,11 @@ class GapSolver:
         self._working = slab.zeros(np.bool_)
 
     def solve(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        tolerance: float,
-        operators: GapOperators | None = None,
+        self, problem: GapProblem, gap: Array, tolerance: float, operators: GapOperators | None = None
     ) -> GapSolution:
         """Solve from the map `gap`, which is overwritten by the solution; collective. `operators` replace the
         solver's."""
-        it = self._begin(law, heights, control, gap, operators or self.operators)
+        it = self._begin(problem, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, no_descent, jumped = (math.inf, 0), 0.0, 0, False, False
         while True:
@@ -450,8 +452,9 @@ class GapSolver:
 
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
-    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> GapIterate:
+    def _begin(self, problem: GapProblem, gap: Array, operators: GapOperators) -> GapIterate:
         """Scale the start to a given mean gap, compute its pressure, and forget the last direction."""
+        law, heights, control = problem
         self._t.fill(0.0)
         sums = self.slab.sum(kernels.sum_of(heights), kernels.sum_of(gap))
         mean_h, mean_g = (each / self.slab.points for each in sums)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from parcontact.contact.problem import Approach, Control, MeanPressure, Operator, Workspace
 from parcontact.effects.adhesion import gap_solver
 from parcontact.effects.adhesion.adhesive_law import AdhesiveSolver
-from parcontact.effects.adhesion.gap_solver import GapOperators, GapSolution, GapSolver, Law
+from parcontact.effects.adhesion.gap_solver import GapOperators, GapProblem, GapSolution, GapSolver, Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -56,7 +56,7 @@ def test_conditions(free: bool, control: Approach | MeanPressure) -> None:
     slab, operators, solve = solver(free)
     h, gap = heights(slab), slab.zeros()
     gap[...] = np.maximum(-h - 0.1, 0.0)
-    found = solve.solve(WEAK, h, control, gap, 1e-8)
+    found = solve.solve(GapProblem(WEAK, h, control), gap, 1e-8)
     assert not found.failure
     sigma = WEAK.strength * np.exp(-gap / WEAK.range)
     opened = gap > 0.0
@@ -78,7 +78,7 @@ def test_the_certificate_is_that_of_the_operator(free: bool, control: Approach |
     slab, operators, solve = solver(free)
     h, gap = heights(slab), slab.zeros()
     gap[...] = np.maximum(-h - 0.1, 0.0)
-    found = solve.solve(WEAK, h, control, gap, 0.02)
+    found = solve.solve(GapProblem(WEAK, h, control), gap, 0.02)
     assert not found.failure
     c = found.p + WEAK.strength * np.exp(-gap / WEAK.range)
     c[(gap == 0.0) & (c > 0.0)] = 0.0
@@ -94,7 +94,7 @@ def test_nothing_holds_a_load_that_pulls_too_much() -> None:
     slab, _, solve = solver(free=True)
     h, gap = heights(slab), slab.zeros()
     gap[...] = np.maximum(-h - 0.1, 0.0)
-    assert solve.solve(WEAK, h, MeanPressure(-1.01 * WEAK.strength), gap, 1e-3).detached
+    assert solve.solve(GapProblem(WEAK, h, MeanPressure(-1.01 * WEAK.strength)), gap, 1e-3).detached
     assert gap.min() > 0.0
 
 
@@ -104,7 +104,7 @@ def test_open_surfaces_that_attract_more_than_the_load_close() -> None:
     h, gap = heights(slab), slab.zeros()
     gap[...] = h.max() - h + WEAK.range
     assert np.mean(WEAK.strength * np.exp(-gap / WEAK.range)) > 0.02
-    found = solve.solve(WEAK, h, MeanPressure(-0.02), gap, 1e-6)
+    found = solve.solve(GapProblem(WEAK, h, MeanPressure(-0.02)), gap, 1e-6)
     assert not found.failure
     assert not found.detached
     assert gap.min() == 0.0
@@ -118,9 +118,9 @@ class Failing:
         self.given: list[tuple[np.ndarray, np.ndarray]] = []
         self.held: list[int] = []
 
-    def solve(self, law: Law, heights: np.ndarray, control: Approach, gap: np.ndarray, *_: object) -> GapSolution:
+    def solve(self, problem: GapProblem, gap: np.ndarray, *_: object) -> GapSolution:
         self.held.append(tracemalloc.get_traced_memory()[0])
-        self.given.append((gap.copy(), heights.copy()))
+        self.given.append((gap.copy(), problem.heights.copy()))
         gap += 1.0
         failure = "" if len(self.given) > 1 else "on purpose"
         return GapSolution(gap, np.zeros_like(gap), 0.0, Certificate(0.0, 0.0, 0.0), 1, failure)
@@ -136,7 +136,7 @@ def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() 
     h = heights(slab)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
-    sticking.solve(WEAK, h, Approach(0.1), gap, lag, out)
+    sticking.solve(GapProblem(WEAK, h, Approach(0.1)), gap, lag, out)
     tracemalloc.stop()
     first, second = gaps.given[:2]
     assert_allclose(second[0], first[0], rtol=0.0, atol=0.0)
@@ -268,7 +268,7 @@ def test_a_state_that_is_stable_on_the_free_body_alone(
     slab, free, solver = sticking(comm, points)
     gap, lag, p = slab.zeros(), slab.zeros(), slab.zeros()
     gap[...] = start[slab.rows]
-    contact, detached = solver.solve(law, heights[slab.rows], control, gap, lag, p)
+    contact, detached = solver.solve(GapProblem(law, heights[slab.rows], control), gap, lag, p)
     assert not contact.failure
     assert not detached
     assert contact.certificate.worst <= TIGHT
@@ -295,7 +295,7 @@ def test_a_load_that_the_free_body_alone_holds(comm: MPI.Intracomm, pull: float)
     gap[...] = expected[slab.rows]
     for load in (0.0, -pull):
         expected = fallen(law, heights, MeanPressure(load), expected)
-        contact, detached = solver.solve(law, heights[slab.rows], MeanPressure(load), gap, lag, p)
+        contact, detached = solver.solve(GapProblem(law, heights[slab.rows], MeanPressure(load)), gap, lag, p)
         assert not contact.failure
         assert not detached
         assert_allclose(gap, expected[slab.rows], rtol=0.0, atol=30.0 * TIGHT * law.range)
