@@ -174,10 +174,11 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 @loop
 def certificate_sums(working, g, h, q, mean, sigma, z):
-    """Return the sums of `certify_gap`: over all points of w, w u and w u^2, over the working set of w |z|, |c| and c.
+    """Return six sums for the certificate of a gap: of w, w u and w u^2 over all points, and of w |z|, |c| and c over
+    the working set.
 
-    Here `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g + h`, and the weight `w = |p| +
-    |c|`.
+    u is the displacement `g + h`. c is the residual `p + sigma` on the working set and 0 elsewhere, with the pressure
+    `p = q + mean`, and z the preconditioned residual. The weight w of a point is |p| + |c|.
     """
     load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(g.shape[0]):
@@ -377,27 +378,6 @@ class GapIterate:
     step: float = 1.0
 
 
-def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
-    """Return the certificate of a gap: the errors z, weighted by the pressure and divided by a length, and the error of
-    the load; collective.
-
-    The length is the variation of the deformation in the contact, at most the range of the law and at least a tenth of
-    this range. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS times,
-    their sum NET times.
-    """
-    *sums, spurious, net = slab.sum(*certificate_sums(working, g, it.heights, q, it.m, sigma, z))
-    load, first, second, wrong = sums
-    least = LEAST_TRACTION * it.law.strength
-    spread, mean = 0.0, 0.0
-    if load > 0.0:
-        mean = first / load
-        spread = math.sqrt(max(second / load - mean**2, 0.0))
-    length = min(max(spread, SOLVER_LEAST_SHARE * abs(mean + it.d), SOLVER_LEAST_SHARE * it.law.range), it.law.range)
-    load = max(load, least)
-    load_error = max(SPURIOUS * spurious, NET * abs(net)) / load
-    return Certificate(SHARPER * wrong / load / length, 0.0, load_error, length)
-
-
 # tuning
 LEAST_CURVATURE = 0.02  # least curvature of E over the elastic one for Newton's step
 LOOSE = 0.01  # stiffness of mean values in majorized steps under a load, over that under an approach
@@ -486,7 +466,8 @@ class GapSolver:
         if it.given is None:
             it.m = self._uniform(it, it.mean_gap)
         else:
-            it.m = -total / count if count else self._least_uniform(it)
+            lowest = 0.0 if count else self.slab.reduce((), [float((-q).max(initial=-np.inf))])[0]
+            it.m = -total / count if count else lowest - it.law.strength  # in full contact the least that keeps it
         sums = pressure_residual(g, q, sigma, it.m, self._working, self._way)
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
@@ -510,11 +491,6 @@ class GapSolver:
         else:
             self._q += it.m
 
-    def _least_uniform(self, it: GapIterate) -> float:
-        """Return the least uniform pressure that keeps full contact; collective."""
-        lowest = float((-self._q).max(initial=-np.inf))
-        return self.slab.reduce((), [lowest])[0] - it.law.strength
-
     def _verdict(
         self, worst: float, tolerance: float, iteration: int, best: float, best_at: int, no_descent: bool
     ) -> str | None:
@@ -533,9 +509,23 @@ class GapSolver:
         return None
 
     def _precondition(self, it: GapIterate, g: Array, z: Array) -> Certificate:
-        """Put `A c` into z, with c in the map of the way. Return the certificate that z gives; collective."""
+        """Put `A c` into z, with c in the map of the way; collective. Return the certificate of the gap: the errors z,
+        weighted by the pressure and divided by a length, and the error of the load.
+
+        The length is the variation of the deformation in the contact, at most the range of the law and at least a tenth
+        of this range. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS
+        times, their sum NET times.
+        """
         it.operators.operator.apply(self._way, z)
-        return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
+        maps = self._working, g, it.heights, self._q, it.m, self._sigma, z
+        load, first, second, wrong, spurious, net = self.slab.sum(*certificate_sums(*maps))
+        mean = first / load if load > 0.0 else 0.0
+        spread = math.sqrt(max(second / load - mean**2, 0.0)) if load > 0.0 else 0.0
+        reach, load = it.law.range, max(load, LEAST_TRACTION * it.law.strength)
+        length = min(max(spread, SOLVER_LEAST_SHARE * abs(mean + it.d), SOLVER_LEAST_SHARE * reach), reach)
+        return Certificate(
+            SHARPER * wrong / load / length, 0.0, max(SPURIOUS * spurious, NET * abs(net)) / load, length
+        )
 
     def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
         """Make the new direction from z. Return `<c, z>`; `scale` belongs to the last direction, 0 forgets it.

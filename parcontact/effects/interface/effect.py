@@ -25,13 +25,10 @@ SAME = 1e-9  # rounding: tolerance on Poisson's ratio
 LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal
 
 
-def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
+def _bell(velocity: float | None, width: float | None, coefficient: float | None, stick: bool) -> Iterator[Fault]:
     if (velocity is None) != (width is None):
         missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
         yield Fault(f"is missing; a bell over the velocity needs it in addition to {given}", (missing,))
-
-
-def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
     if coefficient is not None and not stick:
         yield Fault("needs stick: true", ("coefficient",))
     if coefficient is not None and velocity is not None:
@@ -55,15 +52,21 @@ def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
         )
 
 
-def _sticks(interface: Any, grid: Any, initial: Any, steady: Any) -> Iterator[Fault]:
-    """Refuse what stick is not solved for."""
+def _sticks(
+    interface: Any, grid: Any, initial: Any, steady: Any, bands: Any, history: Any, output: Any
+) -> Iterator[Fault]:
+    """Refuse what stick is not solved for, and maps of tractions without stick."""
     if interface is None or not interface.stick:
+        yield from (fault for check in OF_TRACTIONS for fault in check(output))
         return
     if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
         yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", ("interface", "stick"))
     for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if asked:
             yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
+    if bands is not None and history:
+        sentence = "cannot be used with bands and a history: tractions of all bands would have to be solved together"
+        yield Fault(sentence, ("interface", "stick"))
 
 
 def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
@@ -80,23 +83,12 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
             yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the error of rolling", place)
 
 
-def _in_bands(interface: Any, bands: Any, history: Any) -> Iterator[Fault]:
-    if interface is not None and interface.stick and bands is not None and history:
-        sentence = "cannot be used with bands and a history: tractions of all bands would have to be solved together"
-        yield Fault(sentence, ("interface", "stick"))
-
-
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if interface is not None and interface.stick and adhesion is not None:
         yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
 
 
 OF_TRACTIONS = [check for name, check in limits.no_field.items() if name == "traction"]  # none without `effects.stick`
-
-
-def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:
-    if interface is None or not interface.stick:
-        yield from (fault for check in OF_TRACTIONS for fault in check(output))
 
 
 def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]:
@@ -120,7 +112,7 @@ class Interface(Part):
     stick: Flag = False
 
     one_of = (("shear_stress", "coefficient"),)
-    rules = rules_of(_needs_its_folder, _whole_bell, _coefficient)
+    rules = rules_of(_needs_its_folder, _bell)
 
     def friction(self, material: Any) -> InterfaceFriction | None:
         """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
@@ -142,9 +134,7 @@ class InterfaceEffect(Effect[Memory]):
     section: ClassVar[type[Part]] = Interface
     in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
-    rules: ClassVar[tuple[Rule, ...]] = rules_of(
-        _incompressible, _sticks, _rolls, _in_bands, _no_adhesion, _has_tractions
-    )
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_incompressible, _sticks, _rolls, _no_adhesion)
     lifts: ClassVar[tuple[Any, ...]] = (*OF_TRACTIONS, limits.no_rolling)
 
     @staticmethod
@@ -174,11 +164,11 @@ class InterfaceEffect(Effect[Memory]):
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
     """Return the parts of the friction coefficient by the body and by the interface: the components of both forces
-    along the total force, divided by the normal force. A part is negative if its force opposes the total force, as the
-    force of the interface may after a reversal."""
+    along the total force, divided by the normal force. The force of the interface opposes a `velocity`, of any size. A
+    part is negative if its force opposes the total force, as the force of the interface may after a reversal."""
     scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
     along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
-    own = along * measures.friction_interface
+    own = 0.0 + along * measures.friction_interface  # not -0
     return measures.friction - own, own
 
 

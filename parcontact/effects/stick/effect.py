@@ -58,7 +58,7 @@ from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import Measures
 from ...physics.motion import Vector
 from ..effect import Changes, Instant, Sheared
-from ..interface.effect import InterfaceEffect
+from ..interface.effect import InterfaceEffect, shares
 from . import solver
 from .solver import ShearOperator, TangentialSolver, TractionProblem, components, settle_slips, stacked
 
@@ -85,17 +85,6 @@ class BoundedTraction(NamedTuple):
 
     traction: Array
     bound: Array
-
-
-class _Settled(NamedTuple):
-    """Sums over the points of a step: the energy lost in slip [J], the force on the rigid surface [N], the mean
-    traction over the mean bound, the number of points that stick, and the sum of the map `slipping`."""
-
-    lost: float
-    force: Vector
-    share: Vector
-    stuck: int
-    power: float
 
 
 @dataclass(frozen=True)
@@ -166,13 +155,13 @@ class StickSlip(InterfaceEffect[StickMemory]):
         energy = memory.energy
         if self._energy is not None and energy is not None:
             energy = self._energy.advance(energy, step.dt, now, before, solved.displacement, body, step.growth)
-        settled = self._settle(now, before, new.bound, stiffness, surface_of(body), target)
-        sheared = self._sheared(instant, settled, solved.certificate, memory.last.bound, new.bound)
-        columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
-        lost = memory.lost + sheared.lost
-        after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
+        bounds, u = (memory.last.bound, new.bound), surface_of(body)
+        sheared, share, stuck = self._settle(instant, bounds, now, before, stiffness, u, target, solved.certificate)
+        lost, (x, y) = memory.lost + sheared.lost, sheared.force
+        columns = *shares(sheared.measures, (-x, -y)), stuck
+        after = StickMemory(body, new, memory.last, target, strength, alpha, share, energy, lost, columns)
         whole = not self._free and instant.measures.contact_area == 1.0  # no step resolves how it begins to slide
-        turned = 0.0 if whole else math.dist(settled.share, memory.share)
+        turned = 0.0 if whole else math.dist(share, memory.share)
         return Changes(after, solved.failure, sheared=sheared, turned=turned)
 
     def _strength(self, dt: float, way: float, last: float) -> float:
@@ -214,36 +203,44 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return waves / work if work > 0.0 and waves > UNIFORM * square else 1.0
 
     def _settle(
-        self, now: Pressed, before: Pressed, bound: Array, stiffness: float, u: Array, target: Array
-    ) -> _Settled:
-        """Renew the targets of points that slip or are not touched, and return sums over all points; collective."""
+        self,
+        instant: Instant,
+        bounds: tuple[Array, Array],
+        now: Pressed,
+        before: Pressed,
+        stiffness: float,
+        displacement: Array,
+        target: Array,
+        error: float,
+    ) -> tuple[Sheared, Vector, float]:
+        """Renew the targets of points that slip or are not touched; collective. Return what the tractions add to the
+        measures of a step, their mean over the mean bound, and the share of the box that sticks.
+
+        The `bounds` are those before and after the step. The share of the tractions that is wrong as the area is: all
+        of those by a shear strength; by a coefficient where points stick, as those that slip add up to a share of the
+        load. Spots that stick slip first at their edges, and edge cells make them too stiff; by a coefficient tractions
+        are small there. In rolling, points that enter the contact in a step move with the surface for all of it."""
+        (past, bound), measures = bounds, instant.measures
         t, old = ((each.modulus, *components(each.p)) for each in (now, before))
-        sums = settle_slips(bound, stiffness, *t, *old, *components(u), *components(target), self._slipping)
+        ends = *components(displacement), *components(target)
+        sums = settle_slips(bound, stiffness, *t, *old, *ends, self._slipping)
         lost, total_x, total_y, most, stuck, power = self._slab.sum(*sums)
         unit = self._cell_force * now.modulus
         force = 0.0 - unit * total_x, 0.0 - unit * total_y
-        share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
-        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck), power)
-
-    def _sheared(self, instant: Instant, settled: _Settled, error: float, before: Array, bound: Array) -> Sheared:
-        """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
-
-        The share of the tractions that is wrong as the area is: all of those by a shear strength; by a coefficient
-        where points stick, as those that slip add up to a share of the load. Spots that stick slip first at their
-        edges, and edge cells make them too stiff; by a coefficient tractions are small there. In rolling, points that
-        enter the contact in a step move with the surface for all of it."""
-        area, corrected = instant.measures.contact_area, instant.measures.contact_area_corrected
-        touching = area * self._slab.points
-        sticking, time = settled.stuck / touching if touching else 0.0, 0.0
-        share, mesh = sticking, 0.0
+        mean = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
+        touching = measures.contact_area * self._slab.points
+        sticking = round(stuck) / touching if touching else 0.0
+        share, mesh, time = sticking, 0.0, 0.0
         if touching and self._law.coefficient is None:
-            share, mesh = 1.0, STICKING.value * (1.0 - corrected / area) * sticking * math.hypot(*settled.share)
+            excess = 1.0 - measures.contact_area_corrected / measures.contact_area
+            share, mesh = 1.0, STICKING.value * excess * sticking * math.hypot(*mean)
         if touching and self._scene.job.history[instant.step.stage].rolls:
-            entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
+            entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (past <= 0.0))))[0]
             time = ROLLING.value * (entered / touching) * sticking
-        measures = _with_force(instant, settled.force)
-        slipping = self._slipping if instant.slid and settled.power > 0.0 else bound
-        return Sheared(measures, settled.force, settled.lost, slipping, error, share, time, mesh)
+        loss = lost * self._cell_force * self._scene.units.height
+        slipping = self._slipping if instant.slid and power > 0.0 else bound
+        sheared = Sheared(_with_force(instant, force), force, loss, slipping, error, share, time, mesh)
+        return sheared, mean, round(stuck) / self._slab.points
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the two parts of friction, the share of the box that sticks, and the loss in slip [J], NaN without
@@ -319,13 +316,3 @@ def _with_force(instant: Instant, force: Vector) -> Measures:
         friction_interface=own / normal if presses else 0.0,
         force_interface=own,
     )
-
-
-def parts_of_friction(sheared: Sheared) -> tuple[float, float]:
-    """Return the parts of the friction coefficient by the body and by the interface: the components of both forces
-    along the total force, divided by the normal force."""
-    measures, (x, y) = sheared.measures, sheared.force
-    whole = math.hypot(measures.force_x, measures.force_y)
-    along = x * measures.force_x + y * measures.force_y
-    own = along / (whole * measures.normal_force) if measures.friction > 0.0 else 0.0
-    return measures.friction - own, own

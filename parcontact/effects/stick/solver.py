@@ -272,24 +272,17 @@ def slope_and_curvature(t, new_t, u, new_u, e):
     return slope, curvature, size
 
 
-@loop
-def shorten_change(t, share, new_t):
-    """Move the map `new_t` towards t, so that only a `share` of its difference to t remains."""
-    for j in range(t.shape[0]):
-        for i in range(t.shape[1]):
-            new_t[j, i] = t[j, i] + share * (new_t[j, i] - t[j, i])
-
-
 Vector = tuple[float, float]
 
 
 def stacked(slab: Slab) -> Slab:
     """Return the slab of maps with two components: each rank holds rows of the first, then of the second component."""
-    return Slab(slab.comm, slab.nx, 2 * slab.ny, slab.tally, lambda rank: _twice(slab.rows_of(rank)))
 
+    def twice(rank: int) -> slice:
+        rows = slab.rows_of(rank)
+        return slice(2 * rows.start, 2 * rows.stop)
 
-def _twice(rows: slice) -> slice:
-    return slice(2 * rows.start, 2 * rows.stop)
+    return Slab(slab.comm, slab.nx, 2 * slab.ny, slab.tally, twice)
 
 
 def components(field: Array) -> tuple[Array, Array]:
@@ -495,8 +488,10 @@ class TangentialSolver:
         rounded = max(abs(slope), curvature) <= ROUNDING * size
         share = 1.0 if rounded or curvature <= 0.0 or (hits and slope >= curvature) else max(slope / curvature, 0.0)
         if share < 1.0:
-            shorten_change(t, share, new)
-            shorten_change(u, share, new_u)
+            for old, changed in ((t, new), (u, new_u)):
+                changed -= old
+                changed *= share
+                changed += old
         self._other, self._u, self._other_u = t, new_u, u
         return new, share
 
