@@ -88,18 +88,18 @@ def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
     layout = fields.SavedMaps(file)
     saved = layout.saved
     lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
-    lines += [*_runs(read_chain(file)), *_budget(read_budget(file))]
+    lines += _runs(read_chain(file))
+    for name, parts in read_budget(file).items():
+        if name != "accuracy":
+            errors = (f"{part} {100 * value:.2g} %" for part, value in parts.items())
+            lines.append(f"  error of {name}: {', '.join(errors)}")
     lines.append(f"  {len(saved)} of {len(layout.steps)} instants saved")
     if saved:
         first, last = saved[0], saved[-1]
         lines[-1] += f", t = {layout.times[first]:g} s (step {layout.steps[first]})"
         lines[-1] += f" to {layout.times[last]:g} s (step {layout.steps[last]})"
-    bad = [
-        f"{name} after step {layout.steps[i]}"
-        for name in layout.names
-        for i in saved
-        if not np.isfinite(file[name][i]).all()
-    ]
+    maps = ((name, i) for name in layout.names for i in saved)
+    bad = [f"{name} after step {layout.steps[i]}" for name, i in maps if not np.isfinite(file[name][i]).all()]
     lines.append(f"damaged: values are not finite in {', '.join(bad)}" if bad else "sound: all saved maps are finite")
     return "\n".join(lines), not bad
 
@@ -110,13 +110,6 @@ def _runs(chain: tuple[Link, ...]) -> list[str]:
         f"{'s' if link.ranks > 1 else ''}, {link.program}, {link.started}"
         for link in chain
     ]
-
-
-def _budget(budget: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the estimated errors of friction and area, by part."""
-    for name, parts in budget.items():
-        if name != "accuracy":
-            yield f"  error of {name}: " + ", ".join(f"{part} {100 * value:.2g} %" for part, value in parts.items())
 
 
 def _short(value: NDArray[Any]) -> str:
@@ -172,7 +165,7 @@ def describe_run_in_words(run: Results) -> Iterator[str]:
     """Yield sentences on the slide and the cycles of a run, and sentences of its effects."""
     if (job := run.job) is not None:
         yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
-        yield from slide.describe_cycles(job, run.table)
+        yield from slide.describe_cycles(job, slide.find_cycles(job, run.table))
     for sentences in answers("results", "sentences"):
         yield from sentences(run)
 
@@ -205,19 +198,16 @@ def _curve(found: Results) -> Iterator[str]:
         errors = {name: max(known, default=math.nan) for name, known in curve.errors.items()}
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
-            numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
-            asked = f"; requested: {_accuracy_text(numerics['accuracy'])}" if "accuracy" in numerics else ""
-            yield f"  largest estimated errors of the curve: {parts}{asked}"
+            numerics, requested = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}, ""
+            if (asked := numerics.get("accuracy")) is not None:
+                wanted = asked if isinstance(asked, dict) else {"": asked}
+                each = (f"{name} {100 * value:.3g} %".lstrip() for name, value in wanted.items())
+                requested = f"; requested: {', '.join(each)}"
+            yield f"  largest estimated errors of the curve: {parts}{requested}"
         yield from (f"  warning: {text}" for text in warnings_of(curve.path / outputs.STEADY.log))
     if curve.lost:
         yield f"  the curve has {curve.lost}"
     yield from (f"  {text}" for text in curve.unfinished if text != curve.lost)
-
-
-def _accuracy_text(accuracy: Any) -> str:
-    """Return the accuracy of a job (plain data) as text."""
-    parts = accuracy if isinstance(accuracy, dict) else {"": accuracy}
-    return ", ".join(f"{name} {100 * value:.3g} %".lstrip() for name, value in parts.items())
 
 
 def _saved_states(found: Results) -> Iterator[str]:
@@ -266,10 +256,6 @@ def _describe_running(sweep: Results) -> Iterator[str]:
         yield f"  {len(open_cases)} cases to go: {quantity(left, 's', 2)}, one after the other, if they take as long"
 
 
-def _study(found: Results) -> Iterator[str]:
-    yield "  study: errors and costs of settings are in study.txt"
-
-
 Describe = Callable[[Results], Iterator[str]]
 PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directory, by their file
     outputs.RUN.table: _run,
@@ -280,7 +266,7 @@ PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directo
     outputs.RUN.maps: _saved_maps,
     **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
     outputs.SWEEP.table: _sweep,
-    "study.txt": _study,
+    "study.txt": lambda _: iter(["  study: errors and costs of settings are in study.txt"]),
 }
 
 
@@ -388,16 +374,11 @@ def _headline_of_sweep(directory: Path) -> str:
     return ""
 
 
-def _headline_of_study(directory: Path) -> str:
-    """Return the first sentence of a study, on its accuracy."""
-    return next(iter(Results(directory, "study").sentences_of_study), "")
-
-
 HEADLINES: dict[str, Callable[[Path], str]] = {
     "run": _headline_of_run,
     "steady": _headline_of_curve,
     "sweep": _headline_of_sweep,
-    "study": _headline_of_study,
+    "study": lambda directory: next(iter(Results(directory, "study").sentences_of_study), ""),  # on its accuracy
 }
 
 
@@ -526,9 +507,6 @@ def describe_theory(directory: Path, history: Sequence[Stage], cell: float) -> I
     """Yield a sentence on the predictions, if there is a theory.csv. Raises InputError for damaged tables."""
     results = compare_with_theory(directory, history, cell)
     if results:
-        pairs = (f"{one.name} {one.theory:.3g}{_against_run(one)}" for one in results)
+        known = ("" if one.run is None else f" (run: {with_error(one.run, one.error)})" for one in results)
+        pairs = (f"{one.name} {one.theory:.3g}{run}" for one, run in zip(results, known, strict=True))
         yield f"Persson's theory predicts {', '.join(pairs)}"
-
-
-def _against_run(one: ComparedResult) -> str:
-    return "" if one.run is None else f" (run: {with_error(one.run, one.error)})"

@@ -350,7 +350,7 @@ def describe_directory(directory: Path) -> Chapter:
 def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
     """Yield a chapter that compares several directories in common pictures, with one colour per directory."""
     if len(directories) > 1:
-        shared = plots.compare_panels(directories, least=2)
+        shared = plots.compare_panels(directories)
         if shared:
             tables = compared_table(directories, plots.name_directories(directories))
             together = ReportSection("Together", tables=tables, pictures=[draw_panel(one) for one in shared])

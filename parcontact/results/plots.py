@@ -9,7 +9,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -48,10 +47,8 @@ class PlotOptions:
     out: Path | None = None
 
     def __post_init__(self) -> None:
-        others = [one.key for one in offered("RUN_PANELS")] + [
-            key for keys in answers("pictures", "KEYS") for key in keys
-        ]
-        known = *PANELS, *others, "steady", "maps"
+        others = [one.key for one in offered("RUN_PANELS")]
+        known = *PANELS, *others, *(key for keys in answers("pictures", "KEYS") for key in keys), "steady", "maps"
         if unknown := [name for name in self.panels if name not in known]:
             raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(known)}")
         if unknown := [name for name in self.log if name not in ("x", "y", "none")]:
@@ -69,10 +66,7 @@ class PlotOptions:
 
 def group(found: Sequence[Panel]) -> list[list[Panel]]:
     """Return two groups: the panels of a curve, and the panels of its bands."""
-    bands = [panel.key.startswith("bands") for panel in found]
-    return [
-        [panel for panel, of_bands in zip(found, bands, strict=True) if of_bands == which] for which in (False, True)
-    ]
+    return [[panel for panel in found if panel.key.startswith("bands") == which] for which in (False, True)]
 
 
 def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Path]:
@@ -164,18 +158,16 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     found = [_find_panels(directory, options) for directory in directories]
     if [] in found:
         raise InputError(f"{directories[found.index([])]} has nothing to compare")
-    lost = zip(name_directories(directories), (Results(one).lost for one in directories), strict=True)
+    names = name_directories(directories)
+    lost = zip(names, (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
-    return picture(title, group(_compare(directories, found)), log=options.log)
+    return picture(title, group(compare(list(zip(names, found, strict=True)))), log=options.log)
 
 
-def compare_panels(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
-    """Return the panels that at least `least` directories have, each with the lines of all directories."""
-    return _compare(directories, [_find_panels(directory, options) for directory in directories], least)
-
-
-def _compare(directories: Sequence[Path], found: Sequence[list[Panel]], least: int = 1) -> list[Panel]:
-    return compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
+def compare_panels(directories: Sequence[Path]) -> list[Panel]:
+    """Return the panels that at least two directories have, each with the lines of all directories."""
+    pairs = zip(name_directories(directories), (_find_panels(one, PlotOptions()) for one in directories), strict=True)
+    return compare([pair for pair in pairs if pair[1]], 2)
 
 
 def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
@@ -207,14 +199,14 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
     known = {f"{int(row['case']):03d}": row for row in read_cases(table)}
     rows = [known[path.name] for path in paths if path.name in known]
     differing = [key for key in swept_keys(rows) if len({row[key] for row in rows}) > 1]
-    names = [", ".join(_name_value(key.split(".")[-1], row[key]) for key in differing) for row in rows]
+    names = []
+    for row in rows:
+        pairs = ((key.split(".")[-1], row[key]) for key in differing)
+        shown = (
+            f"{key} {printed.quantity(x, unit_of_path(key), 4) if isinstance(x, float) else x}" for key, x in pairs
+        )
+        names.append(", ".join(shown))
     return names if len(set(names)) == len(paths) and all(names) else []
-
-
-def _name_value(key: str, value: Any) -> str:
-    """Return a key of a sweep and its value as text, such as `velocity 100 mm/s`."""
-    shown = printed.quantity(value, unit_of_path(key), 4) if isinstance(value, float) else value
-    return f"{key} {shown}"
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
@@ -229,25 +221,21 @@ def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list
             found.setdefault((panel.key, panel.x, panel.y), []).append((number, panel))
     names = [name for name, _ in runs]
     lonely = all(len(panel.series) == 1 for group in found.values() for _, panel in group)
-    merge = _merge_lonely if lonely else _merge
-    return [_join(group, merge(group, names)) for group in found.values() if len(group) >= least]
-
-
-def _join(group: Sequence[tuple[int, Panel]], series: Sequence[Line]) -> Panel:
-    panels = [panel for _, panel in group]
-    spikes, log_x = (all(getattr(panel, name) for panel in panels) for name in ("spikes", "log_x"))
-    return replace(panels[0], series=series, shades=(), peak=False, spikes=spikes, log_x=log_x, edges=())
+    merge, joined = _merge_lonely if lonely else _merge, []
+    for group in (group for group in found.values() if len(group) >= least):
+        spikes, log_x = (all(getattr(panel, name) for _, panel in group) for name in ("spikes", "log_x"))
+        plain = replace(group[0][1], shades=(), peak=False, edges=())
+        joined.append(replace(plain, series=merge(group, names), spikes=spikes, log_x=log_x))
+    return joined
 
 
 def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
     """Return the only line of each run, with the colour and the dashes of the run."""
-    lines = ((number, panel.series[0]) for number, panel in group)
-    return [
-        replace(
-            one, name=", ".join(filter(None, (names[number], one.name))), look=one.look | style.line(number, len(names))
-        )
-        for number, one in lines
-    ]
+    found = []
+    for number, (one, *_) in ((number, panel.series) for number, panel in group):
+        name = ", ".join(filter(None, (names[number], one.name)))
+        found.append(replace(one, name=name, look=one.look | style.line(number, len(names))))
+    return found
 
 
 def _merge(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:

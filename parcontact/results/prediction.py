@@ -66,7 +66,9 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
     """
     _refuse_unknown(job)
     timeline = Timeline.from_job(job).follow(_times_of_run(job))
-    rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
+    places = {place for span in timeline.spans for place in (span.origin, span.position(span.ends.count))}
+    longest = max((math.dist(*pair) for pair in combinations(places, 2)), default=0.0)  # bounds phases of waves
+    rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, longest)
     memory = Memory(_on_body(job, rings), _material(job))
     if job.initial.state == "steady":
         memory.slide_for_ever(job.initial.velocity)
@@ -214,9 +216,16 @@ def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySet
 
 def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySettings | None = None) -> Path:
     """Write a table and its settings; raises InputError for a path that cannot be written."""
+    heads = tuple(",".join(names_of(one)).encode() for one in (STEADY_THEORY, BANDS_THEORY))
+
+    def is_own(there: Path) -> bool:
+        """Return True for a table of the theory: histories have settings in the same directory."""
+        known = not settings or there.with_name(FILE).is_file()
+        return known and there.read_bytes().startswith(b"time,distance,pressure," if settings else heads)
+
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(path, is_own_table if settings else _is_own_curve) as file:
+        with files.replaced(path, is_own) as file:
             lines = (map(float, values_of(table, row)) for row in rows)
             file.write(to_csv(names_of(table), lines).encode())
         if settings:
@@ -228,24 +237,8 @@ def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySet
 
 def write_settings(directory: Path, settings: TheorySettings) -> None:
     """Write the settings; raises OSError."""
-    with files.replaced(directory / FILE, is_our_settings) as file:
+    with files.replaced(directory / FILE, lambda path: path.read_bytes().startswith(SETTINGS_HEAD.encode())) as file:
         file.write(SETTINGS.format(**settings._asdict(), version=__version__).encode())
-
-
-def is_our_settings(path: Path) -> bool:
-    """Return True if a file of settings was written by this program; raises OSError."""
-    return path.read_bytes().startswith(SETTINGS_HEAD.encode())
-
-
-def is_own_table(path: Path) -> bool:
-    """Return True if a table has settings in its directory, and is therefore a table of theory; raises OSError."""
-    return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
-
-
-def _is_own_curve(path: Path) -> bool:
-    return path.read_bytes().startswith(
-        tuple(",".join(names_of(one)).encode() for one in (STEADY_THEORY, BANDS_THEORY))
-    )
 
 
 def _refuse_unknown(job: Job) -> None:
@@ -323,12 +316,6 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
         raise InputError("surface: the theory needs waves that fit the box and the grid, the spectrum has none")
     kinks = found.q[(found.q > ends[0]) & (found.q < ends[1])].tolist()
     return persson.rings_of_spectrum(lambda k: np.asarray(found(k), float), *ends, slide, kinks)
-
-
-def _longest_slide(timeline: Timeline) -> float:
-    """Return the largest distance between two positions of the surface [m], which bounds phase differences of waves."""
-    places = {place for span in timeline.spans for place in (span.origin, span.position(span.ends.count))}
-    return max((math.dist(*pair) for pair in combinations(places, 2)), default=0.0)
 
 
 # -- the history ------------------------------------------------------------------------------------------------------

@@ -206,12 +206,12 @@ class Results:
     def unfinished(self) -> list[str]:
         """Sentences on missing results with reasons: points of a curve, cases of a sweep, steps of a run."""
         if self.kind == "sweep":
-            return [*self.failed_cases(), *self._cases_to_go()]
-        return list(self._lost_points() if self.kind == "steady" else self._steps_to_go())
-
-    def _cases_to_go(self) -> Iterator[str]:
-        if count := sum(row["state"] in ("-", "begun") for row in self.cases):
-            yield f"{count} of {len(self.cases)} cases are not finished"
+            count = sum(row["state"] in ("-", "begun") for row in self.cases)
+            return self.failed_cases() + [f"{count} of {len(self.cases)} cases are not finished"] * (count > 0)
+        if self.kind == "run":
+            claim = self.claims.get("run")
+            return ["the run is not finished"] * (claim is None or claim.finished is None)
+        return list(self._lost_points()) if self.kind == "steady" else []
 
     def _lost_points(self) -> Iterator[str]:
         if lost := tables.name_lost(self.path):
@@ -222,11 +222,6 @@ class Results:
             there = [*tables.of_table(self.table), *(one.at for one in tables.read(self.path))]
             if count := len(tables.lacking_points(asked, there)):
                 yield f"{count} of {len(asked)} points are not solved yet"
-
-    def _steps_to_go(self) -> Iterator[str]:
-        claim = self.claims.get("run") if self.kind == "run" else None
-        if self.kind == "run" and (claim is None or claim.finished is None):
-            yield "the run is not finished"
 
     def failed_cases(self, most: int = 10**9) -> list[str]:
         """Return sentences on at most `most` failed cases of a sweep, and a sentence on the number of further ones."""
@@ -293,9 +288,8 @@ class Results:
     def dataset(self) -> xarray.Dataset:
         """Columns of a run along `step`, with the coordinate `time` [s], and the saved maps."""
         maps, known = self.maps, {column.name for column in MEASURES}
-        units = {
-            name: {"units": unit or "1"} if unit or name in known else {} for name, unit in self.table.units.items()
-        }
+        given = self.table.units.items()
+        units = {name: {"units": unit or "1"} if unit or name in known else {} for name, unit in given}
         columns = {name: ("step", values, units[name]) for name, values in self.table.items()}
         steps = "step", np.array(self.table["step"], dtype=int), units["step"]
         rows = {name: value for name, value in columns.items() if name not in ("step", "time")}
@@ -321,20 +315,16 @@ class Results:
         """Return a text with speed, pressure and known temperature of a point of a curve, and with a remark if the
         curve still rises there at the end of its velocities."""
         columns = self.table
-        places = [
-            {name: columns[name][k] for name in PLACES if name in columns} for k in range(len(columns["velocity"]))
-        ]
+        names = [name for name in PLACES if name in columns]
+        places = [dict(zip(names, place, strict=True)) for place in zip(*(columns[n] for n in names), strict=True)]
         at = places[row]
         degrees = at.get("temperature", math.nan)
         degrees = self.temperature if math.isnan(degrees) else degrees
         warm = "" if math.isnan(degrees) else f", {degrees:g} °C"
-        same = [one for one in places if all(_close(one[name], at[name]) for name in at if name != "velocity")]
+        others = [name for name in names if name != "velocity"]
+        same = [one for one in places if all(np.isclose(one[n], at[n], 1e-6, 0.0, equal_nan=True) for n in others)]
         end = describe_end(at, same, ["velocity"])
         return f"at {quantity(at['velocity'], 'm/s')} and {quantity(at['pressure'], 'Pa')}{warm}{end}"
-
-
-def _close(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=1e-6) or (math.isnan(one) and math.isnan(other))
 
 
 def describe_end(best: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:

@@ -122,10 +122,10 @@ def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) 
 def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
     """Return the known absolute errors of mu_max, mu_dyn and the corrected contact area of a slide; `cell` is the
     spacing of the grid along x [m]."""
-    known, slid = slide_errors(history, columns), measure_slide(history, columns)
-    rows, found = _during(history, columns), dict[str, float]()
-    if slid is None:
-        return {}
+    known, found = slide_errors(history, columns), dict[str, float]()
+    if (slid := measure_slide(history, columns)) is None:
+        return found
+    rows = _during(history, columns)
     if not math.isnan(known.get(ERRORS[0], math.nan) + slid.mu_dyn):
         found["mu_max"] = _highest(columns, rows, cell)[1]
         found["mu_dyn"] = mean_of_slide(columns, rows, "friction", ERRORS[0])[1]
@@ -348,9 +348,7 @@ def _during(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
 
 
 LEAST_ROWS = 5  # rows of a cycle with an estimate of the error
-PAIRS = (
-    2.0**3 - 1.0
-)  # accuracy: difference between the errors of steps twice as long and of steps, over the error of steps
+PAIRS = 2.0**3 - 1.0  # accuracy: error of steps twice as long over the error of steps, minus 1
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(4), (1, 0), strict=True))
 HARMONICS = 2.0  # fitted: errors of steps over those of one harmonic (tests/summary/test_cycles.py)
 NOISE = 2.0  # fitted: error of independent solves over that of one (tests/summary/test_cycles.py)
@@ -409,8 +407,11 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
         force, place = area * cycle["pressure"], cycle["approach"]
     else:
         force, place = along, way
-    work = math.nan if stage.speed else _gain(cycle.get("work"))
-    loss, between = _by_work(work, time, force, place) if math.isfinite(work) else _by_rows(time, force, place)
+    loss, between = _by_rows(time, force, place)
+    work = float(np.diff(cycle["work"][[0, -1]])[0]) if "work" in cycle and not stage.speed else math.nan
+    if math.isfinite(work):
+        loss = work - _mean(time, force) * float(place[-1] - place[0])
+        between = _within(force, place, _jumps(time, force))
     phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
     phase = math.remainder(phase, 2.0 * math.pi) if np.ptp(force) and np.ptp(place) else math.nan
     error = between / abs(loss) if loss else math.nan
@@ -420,31 +421,14 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
         error += _mean_error(cycle["error_friction"], np.abs(along))
     with np.errstate(divide="ignore", invalid="ignore"):
         friction = along / (area * cycle["pressure"]) if stage.speed else np.full(1, np.nan)
-    return Cycle(
-        index,
-        number,
-        stage.frequency,
-        loss,
-        error,
-        0.5 * float(np.ptp(friction)),
-        0.5 * float(np.ptp(cycle["approach"])),
-        phase,
-    )
-
-
-def _gain(work: Array | None) -> float:
-    """Return the change of work over a cycle [J]; NaN without energies."""
-    return math.nan if work is None else float(work[-1] - work[0])
-
-
-def _by_work(work: float, time: Array, force: Array, place: Array) -> tuple[float, float]:
-    """Return the loss of a cycle from the work of its load, and its error by jumps of the force [J]."""
-    return work - _mean(time, force) * float(place[-1] - place[0]), _within(force, place, _jumps(time, force))
+    mu, depth = (0.5 * float(np.ptp(values)) for values in (friction, cycle["approach"]))
+    return Cycle(index, number, stage.frequency, loss, error, mu, depth, phase)
 
 
 def _by_rows(time: Array, force: Array, place: Array) -> tuple[float, float]:
     """Return the loss of a cycle from force and displacement, and its error by interpolation and jumps [J]."""
-    loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), _every_second(time.size)))
+    every_second = np.unique([*range(0, time.size, 2), time.size - 1])
+    loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), every_second))
     near = np.convolve(_jumps(time, force), np.ones(5), "same") > 0.0
     return loss, abs(rough - loss) / PAIRS + _within(force, place, near)
 
@@ -501,15 +485,11 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     files.replace_file(
         directory / outputs.RUN.tables[0], to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found))
     )
-    yield from _describe_stages(job, found)
+    yield from describe_cycles(job, found)
 
 
-def describe_cycles(job: Job, columns: Columns) -> Iterator[str]:
-    """Yield a sentence on the last cycles of each stage that oscillates."""
-    yield from _describe_stages(job, find_cycles(job, columns))
-
-
-def _describe_stages(job: Job, found: Sequence[Cycle]) -> Iterator[str]:
+def describe_cycles(job: Job, found: Sequence[Cycle]) -> Iterator[str]:
+    """Yield a sentence on the last of the cycles of each stage that oscillates."""
     for index, stage in enumerate(job.history):
         if own := [cycle for cycle in found if cycle.stage == index]:
             yield _describe(job, stage, own)
@@ -550,11 +530,6 @@ def way_along(stage: Stage, columns: Mapping[str, Array], start: float) -> Array
     if not isinstance(stage.velocity, Swing):
         return None
     return stage.speed * np.array([stage.moving(time - start) for time in columns["time"].tolist()])
-
-
-def _every_second(count: int) -> Array:
-    """Return the indices of every second row, and of the last one."""
-    return np.unique([*range(0, count, 2), count - 1])
 
 
 def _over_time(time: Array, *values: Array) -> tuple[Array, list[tuple[Array, Array]]]:
