@@ -34,7 +34,7 @@ from .surfaces import Rough
 
 
 class Sections(Protocol):
-    """The sections of a job that warnings need."""
+    """The sections of a job that determine its warnings and its steps."""
 
     grid: Grid
     surface: tuple[Any, ...]
@@ -56,6 +56,10 @@ class Sections(Protocol):
     @property
     def sheared_first(self) -> bool:
         """Return True if an effect shears the contact before it slides."""
+
+    @property
+    def remembers(self) -> bool:
+        """Return True if the result depends on the history."""
 
     def asked(self, name: str) -> list[Any]:
         """Return the attribute `name` of each effect whose section the job has."""

@@ -14,13 +14,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice, takewhile
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from .advice import one_cell
-from .calculation import Grid, Numerics
+from .advice import Sections, one_cell
+from .calculation import Grid
 from .limits import estimate_steps, first_step
 from .parts import AUTO
-from .stages import PARTS_OF_CYCLE, GeometricStep, Initial, Stage
+from .stages import PARTS_OF_CYCLE, GeometricStep, Stage
 from .surfaces import Flat, Indenter, Rough, Wave
 
 SAME_TIME = 1e-9  # accuracy: relative deviation of a duration from a whole number of steps that is ignored
@@ -37,19 +37,6 @@ def reached(time: float, until: float) -> bool:
     return time >= until * (1.0 - SAME_TIME)
 
 
-class Planned(Protocol):
-    """Sections of a job that determine its steps, and whether its body has a memory."""
-
-    grid: Grid
-    surface: tuple[Any, ...]
-    history: tuple[Stage, ...]
-    numerics: Numerics
-    initial: Initial
-
-    @property
-    def remembers(self) -> bool: ...
-
-
 @dataclass(frozen=True)
 class Bounds:
     """Shortest and longest step of a stage that chooses its own [s]."""
@@ -58,7 +45,7 @@ class Bounds:
     most: float
 
 
-def most_cells(job: Planned) -> int:
+def most_cells(job: Sections) -> int:
     """Return the largest number of cells that a step may slide: the largest power of two up to a quarter of the
     shortest wave; one if a quarter wave is shorter than a cell, or if a file may have any wave."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
@@ -182,7 +169,7 @@ class ChosenSteps:
     next: float = 0.0
 
     @classmethod
-    def from_job(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
+    def from_job(cls, job: Sections, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
         """Return the chosen steps of a job, including the steps in the arrays `saved` of a checkpoint."""
         found = cls(most_cells(job))
         if saved is not None and "ends" in saved:
@@ -223,7 +210,7 @@ class ChosenSteps:
         }
 
 
-def describe_steps(job: Planned) -> str:
+def describe_steps(job: Sections) -> str:
     """Return a text on the stages that choose their own time steps, with the reason; '' if there are none."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
@@ -440,7 +427,7 @@ class Timeline:
         self._open, self._seen = 0, 0  # the stage that chooses its steps, and the number of chosen steps
 
     @classmethod
-    def from_job(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
+    def from_job(cls, job: Sections, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
         """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end. `chosen`
         has the steps that stages have chosen so far; further steps are estimated."""
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None

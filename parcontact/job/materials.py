@@ -181,6 +181,7 @@ class PronyBranch(Part):
     """A term `modulus exp(-t / relaxation_time)` of the relaxation function."""
 
     label: ClassVar[str] = "a branch of the form modulus, relaxation_time"
+    long_modulus: ClassVar[float] = 0.0
     modulus: Modulus
     relaxation_time: Positive = Field(description="a positive time [s]")
 
@@ -188,11 +189,6 @@ class PronyBranch(Part):
     def instant_modulus(self) -> float:
         """Return the instantaneous modulus of the term [Pa]."""
         return self.modulus
-
-    @property
-    def long_modulus(self) -> float:
-        """Return the long-term modulus of the term, which is 0 [Pa]."""
-        return 0.0
 
 
 class FractionBranch(Part):

@@ -162,19 +162,14 @@ def refuse_overrides(sweep: Sweep, overrides: list[Setting], source: Source) -> 
 OURS = Path(__file__).parents[1] / "materials"  # compounds that come with the program
 
 
-class Reading(NamedTuple):
-    """The data of a job or a case, the files of its included materials, and its sweep (None if it has mistakes)."""
-
-    source: Source
-    included: tuple[Included, ...]
-    sweep: Sweep | None
-
-
 Change = str | tuple[str, Any]  # `key.path=value`, or a key and Python data
 
 
-def read_job(path: Path, changes: Iterable[Change], case: int = 0, given: Source | None = None) -> Reading:
-    """Return the data of a job with its overrides, the settings of a case of its sweep, and the included material.
+def read_job(
+    path: Path, changes: Iterable[Change], case: int = 0, given: Source | None = None
+) -> tuple[Source, tuple[Included, ...], Sweep | None]:
+    """Return the data of a case of a job with its overrides and included materials, the files of these materials, and
+    the sweep of the job, None if it has mistakes.
 
     If `given`, this source replaces the file.
     """
@@ -196,7 +191,7 @@ def read_job(path: Path, changes: Iterable[Change], case: int = 0, given: Source
     included = [_include(source, path, name, {} if "include" in own else own) for name, own in owns.items()]
     for override in (one for one in overrides if one.path not in first):
         _apply(source, override)
-    return Reading(source, tuple(filter(None, included)), sweep)
+    return source, tuple(filter(None, included)), sweep
 
 
 def _parse(change: Change, source: Source) -> Setting | None:

@@ -5,7 +5,6 @@ are checked by `parcontact check` only."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -181,11 +180,10 @@ def _keys(part: type[Part]) -> Iterator[Key]:
     for word, schema in found.get("properties", {}).items():
         words = literal_words(part.model_fields[word].annotation)
         text = schema.get("description") or (list_words(words) if words else "a mapping of the keys below")
-        units = [unit for unit in re.findall(r"\[([^\]]+)\]", text) if "," not in unit]
         needed = word in found.get("required", ()) or word == kind_key(part)
         bounds = dict(_bounds(schema))
         within = " and ".join(said.format(bounds[name]) for name, said in BOUNDS.items() if name in bounds)
-        yield Key(word, text, (units or [""])[-1], within, _text(schema.get("default")), needed)
+        yield Key(word, text, unit_in(text), within, _text(schema.get("default")), needed)
 
 
 def _bounds(schema: Any) -> Iterator[tuple[str, float]]:

@@ -55,6 +55,7 @@ class Oscillation:
     amplitude: float
     frequency: float
     constant = False
+    seconds = 0.0  # the duration follows from the number of cycles of the stage
 
     @property
     def start(self) -> float:
@@ -72,11 +73,6 @@ class Oscillation:
     @property
     def highest(self) -> float:
         return self.mean + self.amplitude
-
-    @property
-    def seconds(self) -> float:
-        """Return 0: the duration follows from the stage's number of cycles."""
-        return 0.0
 
     def at(self, fraction: float, seconds: float) -> float:
         """Return the load `seconds` after the start of the stage; exact at both turns."""

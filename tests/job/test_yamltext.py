@@ -156,7 +156,7 @@ def test_an_include_is_searched_in_the_directory_of_the_job_only(tmp_path: Path)
     )
     alongside = tmp_path / "deep" / "materials" / "m.yaml"
     alongside.write_bytes(b"abc: 1\n")
-    (included,) = read_job(tmp_path / "deep" / "job.yaml", ()).included
+    _, (included,), _ = read_job(tmp_path / "deep" / "job.yaml", ())
     assert included.path == alongside
     # printf 'abc: 1\n' | sha256sum
     assert included.sha256 == "be10690b979a6439e0a095045129e20996ed424d61bb7149016297110c1b4303"
