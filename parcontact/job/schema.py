@@ -34,6 +34,7 @@ from .parts import (
     kind_key,
     listed,
     literal_words,
+    unit_in,
 )
 from .reading import materials
 from .stages import Stage, expand_range
