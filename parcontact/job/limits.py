@@ -71,8 +71,9 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
             got = f"got {shape.short_wavelength!r}, which needs {needed} points along {axis}"
             sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), {got}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
-        if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
-            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
+        given = isinstance(shape, Rough | RoughSpectrum | Topography) and shape.short_wavelength
+        if given and given > max(grid.size):
+            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {given!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         elif isinstance(shape, Rough) and not has_wave(grid, shape.short_wavelength, shape.long_wavelength):
             sentence = f"must leave a wave of the grid down to short_wavelength, {shape.short_wavelength:g} m, but has "

@@ -110,7 +110,13 @@ def _in_metres(part: Topography, found: MapContents) -> Map:
     return Map(np.ascontiguousarray(heights), (lx, ly))
 
 
+def _refuse_channel(part: Topography) -> None:
+    if part.channel is not None:
+        raise InputError(f"{part.path} has no channel {part.channel!r}: it holds one map; leave out channel")
+
+
 def _array(part: Topography) -> MapContents:
+    _refuse_channel(part)
     return MapContents(text_tables.open_numbers(part.path))
 
 
@@ -154,6 +160,7 @@ def _text(part: Topography) -> MapContents:
         esri = {line.split()[0].lower(): line.split()[1:] for line in head}
         if first is None or (columns > 3 and "cellsize" not in esri and re.search(SIZED, "\n".join(head))):
             return _instrument(part)
+        _refuse_channel(part)
         table = _table(path, chain([first], rows), columns in (2, 3))
     if "cellsize" in esri:  # an ESRI grid, whose first row has the largest y
         missing, cell = (float(esri.get(key, ["nan"])[0]) for key in ("nodata_value", "cellsize"))

@@ -108,6 +108,7 @@ def test_another_part_of_the_map(road: Path) -> None:
         (", unit: inch", "surface.unit must be m | mm | um | nm, got 'inch'"),
         (", detrend: slope", "surface.detrend must be none | mean | tilt | curvature, got 'slope'"),
         (", scale: 2", "surface.scale is not a key of shape topography"),
+        (", short_wavelength: 2e-3", "surface.short_wavelength must fit into the box of 0.001 m, got 0.002"),
     ],
 )
 def test_mistakes_name_their_key(road: Path, more: str, sentence: str) -> None:

@@ -294,6 +294,8 @@ BAD = {
         "save an array of another kind by numpy.save",
     ),
     "numbers in a file of another name": ("road.map", rows(), ("um", None, None), "rename it to end in .npy, .h5"),
+    "a channel of an array": ("road.npy", HEIGHTS, ("m", SIZE, "Gloss"), "has no channel 'Gloss': it holds one map"),
+    "a channel of numbers": ("road.txt", rows(), ("m", None, "Gloss"), "has no channel 'Gloss': it holds one map"),
     "a channel that HDF5 lacks": ("road.h5", HEIGHTS, ("m", SIZE, "Gloss"), "has no channel 'Gloss'; it has heights"),
     "the size of a header, twice": ("headed.txt", None, ("um", SIZE, None), "leave out size"),
     "a unit twice": ("road.nc", None, ("mm", None, None), "leave out unit"),
