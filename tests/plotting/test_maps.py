@@ -193,7 +193,8 @@ def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, s
 def test_maps_of_a_pull_off(tmp_path: Path, drawn: list[Figure]) -> None:
     """The contact is pulled hardest in row 3, and lost in row 4; maps are there of all steps but that of row 3."""
     loads = "".join(f"{{pressure: {load}}}, " for load in (1e3, 2e3, 3e3, 4e3, 5e3))
-    out = ran(tmp_path, WAVE + ELASTIC + f"history: [{loads}]\noutput: {{fields: pressure}}\n")
+    adhesion = "adhesion: {work: 0.01, range: 1.0e-5}\n"
+    out = ran(tmp_path, WAVE + ELASTIC + adhesion + f"history: [{loads}]\noutput: {{fields: pressure}}\n")
     run = PlottedRun(out)
     for name, values in {"pressure": [0, 3, 1, -2, 0, 0], "approach": [0, -1, -2, -3, -4, -5]}.items():
         run.table[name] = [float(value) for value in values]
