@@ -25,7 +25,7 @@ from ..job import Stage, load
 from ..job.listing import answers, unit_of_path
 from ..parallel.slab import Array
 from . import style
-from .panels import Axis, ColumnPanel, Line, Panel, offered
+from .panels import Axis, ColumnPanel, Line, Panel, entry, offered
 from .plotted_run import FRACTION, PlottedRun, count_different, round_digits, to_contact_area, to_load
 from .results import CURVES, PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
@@ -38,9 +38,7 @@ AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN_LINE}
 OVER_TIME = style.line(1)  # of the theory, as in the panels of all histories
 STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
-STEADY_ENTRY = Line("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
 SAME = 1e-9  # rounding: of distances
-ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
 def panels_of_bands(directory: Path) -> list[Panel]:
@@ -60,7 +58,9 @@ def panels_of_bands(directory: Path) -> list[Panel]:
         (name,) = one.columns.values()
         if name in columns and np.isfinite(columns[name]).any():
             found.append(_over_bands(one.key, columns, None, name, one.y))
-    if at := _describe_first(whole):
+    firsts = [(name, float(whole[name][0]), unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
+    several = [printed.quantity(value, unit) for name, value, unit in firsts if count_different(whole[name]) > 1]
+    if at := ", ".join(several):
         found = [replace(panel, y=replace(panel.y, name=f"{panel.y.name}\nat {at}")) for panel in found]
     return found
 
@@ -84,8 +84,8 @@ def panels_of_slips(run: PlottedRun) -> list[Panel]:
         for label, look, (at, *values) in ((name, style.line(count + (count > 0)), own), *others):
             friction.append(Line(label, at, values[0], look))
             area.append(Line(label, at, values[1], look))
-    there = ((outputs.THEORY.table, replace(ENTRY, look=OVER_TIME)), (outputs.STEADY.table, STEADY_ENTRY))
-    entries = [entry for name, entry in there if run.has(name)]
+    names = ((outputs.THEORY.table, "theory", OVER_TIME), (outputs.STEADY.table, "steady sliding", STEADY_LOOK))
+    entries = [entry(name, look) for table, name, look in names if run.has(table)]
     bands = run.read(outputs.BANDS).arrays()
     last = bands["distance"] - starts[slides[-1]]
     kept = (last > SAME * bands["distance"]) & (last <= ways[slides[-1]] + SAME * bands["distance"])
@@ -118,13 +118,6 @@ def _steady_of(run: PlottedRun, stage: Stage, slip: Array) -> Iterator[Curve]:
             yield "", STEADY_LOOK, (ends, *(np.full(2, curve[name][row]) for name in ("friction", CORRECTED)))
 
 
-def _describe_first(columns: dict[str, Array]) -> str:
-    """Return the first pressure and temperature as text, if the table has several."""
-    firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
-    several = [one for one in firsts if count_different(columns[one[0]]) > 1]
-    return ", ".join(printed.quantity(float(value), unit) for _, value, unit in several)
-
-
 def _read(curve: Results, table: str, needed: Sequence[str]) -> dict[str, Array]:
     """Return a table of a curve; rows without a temperature have that of the job, if there is one."""
     columns = curve.read(table).arrays(needed)
@@ -150,7 +143,7 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Pan
     if not (speeds := np.unique(theory["velocity"])).size:
         return found
     sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
-    return replace(found, series=[*found.series, ENTRY, Line("", speeds, sums, THEORY_LOOK)])
+    return replace(found, series=[*found.series, entry("theory", THEORY_LOOK), Line("", speeds, sums, THEORY_LOOK)])
 
 
 def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Panel:
@@ -171,7 +164,8 @@ def _over_bands(
     """Return a panel of the area over magnification, or of another column over wavelength, for some velocities."""
     longest = float(columns["long_wavelength"].max())
     x = Axis("magnification") if y is AREA else Axis("shortest wave of the band", "m")
-    shown, by, tables = _some(np.unique(columns["velocity"])), {"velocity": "m/s"}, list[dict[str, Array]]()
+    speeds, by, tables = np.unique(columns["velocity"]), {"velocity": "m/s"}, list[dict[str, Array]]()
+    shown = speeds[np.unique(np.linspace(0, speeds.size - 1, min(SHOWN, speeds.size)).round().astype(int))]
     for table in filter(None, (columns, theory)):
         kept = np.isclose(table["velocity"][:, None], shown, rtol=1e-6).any(axis=1)
         some = {column: values[kept] for column, values in table.items()}
@@ -182,14 +176,8 @@ def _over_bands(
     return Panel(key, x, y, series, log_x=True)
 
 
-def _some(speeds: Array) -> Sequence[float]:
-    places = np.unique(np.linspace(0, speeds.size - 1, min(SHOWN, speeds.size)).round().astype(int))
-    return [float(speed) for speed in speeds[places]]
-
-
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
 COLD = "friction_cold"  # friction without feedback from heat
-EMPTY = np.zeros(0)
 THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
 
 
@@ -284,55 +272,41 @@ def _make_thin(
     look = {"color": style.GREY, "linestyle": THIN[label], "linewidth": THIN_LINE}
     lines = [line for line in _make_lines(columns, x, y, by, drawn) if line.x.size]
     if lines:
-        yield Line(label, EMPTY, EMPTY, look)
+        yield entry(label, look)
     for line in lines:
         yield Line("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
 
 
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
-THIN_CASE = 1.0  # tuning: width of lines of the theory [points]
-GREY, NOTHING = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
+GREY = {"color": style.GREY}  # entries of legends that hold for all colours
 STYLES = ("-", "--", ":", "-.")  # dashes of lines, by the values of further keys
 WIDE = 10.0  # ratio of the largest to the smallest number above which an axis is logarithmic
-Panels = tuple[ColumnPanel, ...]
-FRICTION, AREA_OF_CASE = Axis("friction coefficient"), Axis(FRACTION)
-PANELS: Panels = (
+FRICTION = Axis("friction coefficient")
+PANELS = (
     ColumnPanel("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
-    ColumnPanel("area", AREA_OF_CASE, {"simulation": CORRECTED}),
+    ColumnPanel("area", AREA, {"simulation": CORRECTED}),
     ColumnPanel("loss", Axis("loss per cycle", "J"), {"last cycle": "loss"}),
     ColumnPanel("phase", Axis("phase", "rad"), {"last cycle": "phase"}),
     ColumnPanel("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
 )
-CURVE_PANELS: Panels = (
+CURVE_PANELS = (
     ColumnPanel("friction", FRICTION, {"steady sliding": "friction"}),
-    ColumnPanel("area", AREA_OF_CASE, {"steady sliding": CORRECTED}),
+    ColumnPanel("area", AREA, {"steady sliding": CORRECTED}),
 )
-SHARES = {
-    "friction": "error_friction",
-    "loss": "error_loss",
-    CORRECTED: "error_area",
-}  # columns with the relative error of a column
-SIZES = {
-    name: f"{name}_error" for name in names_of(SWEEP) if f"{name}_error" in names_of(SWEEP)
-}  # columns with the absolute error of a column
+SHARES = {"friction": "error_friction", "loss": "error_loss", CORRECTED: "error_area"}  # columns of relative errors
+SIZES = {name: f"{name}_error" for name in names_of(SWEEP) if f"{name}_error" in names_of(SWEEP)}  # of absolute errors
 
 Rows = Sequence[dict[str, Any]]
-
-
-def all_panels() -> Panels:
-    """Return all panels that a sweep may have, with the panels of effects, in the order of the columns of sweep.csv."""
-    found = (*PANELS, *offered("SWEEP_PANELS"))
-    place = names_of(SWEEP).index
-    return tuple(sorted(found, key=lambda panel: place(next(iter(panel.columns.values())))))
 
 
 def panels_of_sweep(directory: Path) -> list[Panel]:
     """Return panels of a sweep; an empty list without results, or if no swept key has numbers."""
     table = Results(directory, "sweep").points
-    rows, panels = read_cases(table), all_panels()
-    keys = _find_keys(rows)
+    rows, place = read_cases(table), names_of(SWEEP).index
+    panels = sorted((*PANELS, *offered("SWEEP_PANELS")), key=lambda panel: place(next(iter(panel.columns.values()))))
+    keys = [name for name in _drop_joint_keys(rows, _swept(rows)) if all(isinstance(row[name], float) for row in rows)]
     if table.name == CURVES:
-        panels = CURVE_PANELS
+        panels = list(CURVE_PANELS)
         places = {name: {row[name] for row in rows if row[name] == row[name]} for name in PLACES}
         keys = [name for name, values in places.items() if len(values) > 1] + keys
     if not keys:
@@ -347,13 +321,6 @@ def panels_of_sweep(directory: Path) -> list[Panel]:
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
             found.append(Panel(panel.key, x, panel.y, series, log_x=wide))
     return found
-
-
-def _find_keys(rows: Rows) -> list[str]:
-    """Return the keys with several numbers, except those that choose a sample; of keys that change together the
-    first."""
-    keys = _drop_joint_keys(rows, _swept(rows))
-    return [name for name in keys if all(isinstance(row[name], float) for row in rows)]
 
 
 def _swept(rows: Rows) -> list[str]:
@@ -414,7 +381,7 @@ def _make_series(rows: Rows, key: str, columns: Mapping[str, str]) -> list[Line]
                 elif len(columns) > 1:
                     names.setdefault(name, GREY | {"marker": MARKERS[k], "linestyle": "none"})
                 found.append(replace(one, name=""))
-    return [*(Line(name, NOTHING, NOTHING, look) for name, look in names.items()), *found]
+    return [*(entry(name, look) for name, look in names.items()), *found]
 
 
 def _make_lines_of_cases(
@@ -431,7 +398,7 @@ def _make_lines_of_cases(
             dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
             yield Line("each case", x[there], y[there], look | dots)
     if (there := np.isfinite(theory)).any():
-        thin = {"linestyle": DASHES[number], "linewidth": THIN_CASE}
+        thin = {"linestyle": DASHES[number], "linewidth": THIN_LINE}
         yield Line(names[1], *_average(x[there], theory[there]), look | thin)
 
 

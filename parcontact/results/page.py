@@ -151,9 +151,8 @@ def origin_section(directory: Path, found: Log) -> ReportSection:
 
 def list_citations(job: Job | None) -> ReportSection:
     """Return the section with the references to cite for a job's results."""
-    return ReportSection(
-        "References to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())]
-    )
+    cited = provenance.cite_lines(plain_data(job)) if job else ()
+    return ReportSection("References to cite", [provenance.PROGRAM, *cited])
 
 
 MOST_POINTS = 2**22  # most points of a surface that is computed for a report
@@ -162,17 +161,15 @@ MOST_POINTS = 2**22  # most points of a surface that is computed for a report
 def road_section(job: Job) -> ReportSection:
     """Return the section on the surface of a job, computed again; only its keys if its files are gone or it is too
     large."""
-    shapes = ReportTable(
-        ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
-    )
+    lines = [(listing.listed_line(part),) for part in job.surface]
+    shapes = ReportTable(("shape",), lines, "shapes, whose heights add up")
     if job.bands is not None:
         return _describe_bands(job, shapes)
     if job.grid.nx * job.grid.ny == 1:  # a job in bands without its files
         return ReportSection("Surface", ["The surface cannot be computed again: the files of the job do not exist."])
     if job.grid.nx * job.grid.ny > MOST_POINTS:
-        return ReportSection(
-            "Surface", ["The surface has too many points to be computed again for a report."], [shapes]
-        )
+        many = "The surface has too many points to be computed again for a report."
+        return ReportSection("Surface", [many], [shapes])
     slab = Slab.alone(*job.grid.points)
     try:
         made, remarks = rigid_surface.make_surface(job, FFT(slab))
@@ -183,10 +180,8 @@ def road_section(job: Job) -> ReportSection:
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     waves = any(not isinstance(part, Indenter) for part in job.surface)
-    tables = [
-        shapes,
-        *([ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))] if waves else []),
-    ]
+    statistics = ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))
+    tables = [shapes, *([statistics] if waves else [])]
     return ReportSection("Surface", sentences, tables, _draw(surface_summary.Sketch(heights, job.grid.size, found)))
 
 
@@ -242,11 +237,8 @@ def material_section(job: Job) -> ReportSection:
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return ReportSection(
-        "Material",
-        tables=tables,
-        pictures=[draw_panel(panel, CAPTION.format(panel.y.name)) for panel in _over_frequency(job)],
-    )
+    pictures = [draw_panel(panel, CAPTION.format(panel.y.name)) for panel in _over_frequency(job)]
+    return ReportSection("Material", tables=tables, pictures=pictures)
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:

@@ -38,8 +38,7 @@ TICKS = 5  # most intervals of ticks of a bar of colours
 class Line:
     """A line, or bars, of a panel: name (or ''), values in SI units, and their relative errors if known.
 
-    Bars stand on the bars before them with the same `stack` number. A line without values is only an entry of the
-    legend.
+    Bars stand on the bars before them with the same `stack` number.
     """
 
     name: str
@@ -48,6 +47,11 @@ class Line:
     look: dict[str, Any] = field(default_factory=lambda: style.line(0))
     error: Array | None = None
     stack: int | None = None
+
+
+def entry(name: str, look: dict[str, Any]) -> Line:
+    """Return a line without values, which is only an entry of the legend."""
+    return Line(name, np.zeros(0), np.zeros(0), look)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from .. import printed
@@ -19,7 +18,7 @@ from ..files import hdf5, outputs
 from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
 from . import band_charts, info, maps, plotted_run, style
-from .panels import Axis, Line, Panel, offered, picture
+from .panels import Axis, Line, Panel, entry, offered, picture
 from .plotted_run import PlottedRun
 from .results import Results, read_cases, swept_keys
 
@@ -240,13 +239,13 @@ def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> l
 
 def _merge(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
     """Return all lines of the runs in a panel, and entries of the legend for the runs and for the names of lines."""
-    colors, empty = style.colors(len(names)), np.zeros(0)
+    colors = style.colors(len(names))
     whole = [one for _, panel in group for one in panel.series]
     marked = dict.fromkeys(one.name for one in whole if one.name and one.x.size and one.stack is None)
     marks = dict(zip(marked, itertools.cycle(MARKERS), strict=False)) if len(marked) > 1 else {}
-    entries = [Line(names[number], empty, empty, {"color": colors[number]}) for number, _ in group]
+    entries = [entry(names[number], {"color": colors[number]}) for number, _ in group]
     for name, mark in marks.items():
-        entries.append(Line(name, empty, empty, {"color": style.GREY, "marker": mark, "linestyle": "none"}))
+        entries.append(entry(name, {"color": style.GREY, "marker": mark, "linestyle": "none"}))
     entries += {one.name: one for one in whole if not one.x.size}.values()
     for number, panel in group:
         bars = sum(one.stack is not None for one in panel.series)

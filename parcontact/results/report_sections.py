@@ -8,7 +8,7 @@
 import base64
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -249,15 +249,17 @@ def describe_run(directory: Path) -> ReportSection:
     ]
     found = plotted_run.panels_of_run(run)
     unnamed = [replace(one, shades=[replace(shade, name="") for shade in one.shades]) for one in found[1:]]
-    pictures = [*map(draw_panel, [*found[:1], *unnamed]), *_more_pictures(directory)]
+    pictures = [*map(draw_panel, [*found[:1], *unnamed])]
+    for known in answers("results", "PICTURES"):
+        pictures += _stored(directory, known)
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 
-def _more_pictures(directory: Path) -> list[tuple[str, str]]:
-    """Return the pictures of capabilities that exist."""
-    known = {directory / name: words for found in answers("results", "PICTURES") for name, words in found.items()}
-    there = {path: words for path, words in known.items() if path.is_file() and not path.is_symlink()}
-    return [(to_uri(path.read_bytes(), "image/png"), words) for path, words in there.items()]
+def _stored(directory: Path, captions: Mapping[str, str]) -> list[Picture]:
+    """Return the pictures of a directory that exist, by the names of their files and with their captions."""
+    paths = {directory / name: caption for name, caption in captions.items()}
+    there = {path: caption for path, caption in paths.items() if path.is_file() and not path.is_symlink()}
+    return [(to_uri(path.read_bytes(), "image/png"), caption) for path, caption in there.items()]
 
 
 def describe_curve(directory: Path) -> ReportSection:
@@ -307,11 +309,8 @@ def describe_sweep(directory: Path) -> ReportSection:
     rows = read_cases(sweep.points)
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    settings, failed = info.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
-    sentences = list(filter(None, [settings, *failed]))
-    return ReportSection(
-        "Sweep", sentences, [table], [draw_panel(panel) for panel in band_charts.panels_of_sweep(directory)]
-    )
+    sentences = list(filter(None, [info.describe_settings(directory), *sweep.failed_cases(MOST_ROWS)]))
+    return ReportSection("Sweep", sentences, [table], [*map(draw_panel, band_charts.panels_of_sweep(directory))])
 
 
 def _add_unit(name: str) -> str:
@@ -328,12 +327,7 @@ def describe_study(directory: Path) -> ReportSection:
     rows = study.study_rows
     table = _shorten(list(rows[0]) if rows else [], [list(row.values()) for row in rows])
     sentences = study.sentences_of_study or ["The study is not finished."]
-    pictures = [
-        (to_uri((directory / name).read_bytes(), "image/png"), caption)
-        for name, caption in STUDY_PICTURES.items()
-        if (directory / name).is_file()
-    ]
-    return ReportSection("Cost of accuracy", sentences, [table], pictures)
+    return ReportSection("Cost of accuracy", sentences, [table], _stored(directory, STUDY_PICTURES))
 
 
 def _to_words(name: str) -> str:

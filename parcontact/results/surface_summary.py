@@ -48,19 +48,18 @@ def draw_surface(sketch: Sketch, path: Path) -> None:
 
 def panels_of(sketch: Sketch) -> dict[str, Panel]:
     """Return the panels of a rigid surface by names of their contents."""
+    found, (lx, ly) = sketch.found, sketch.size
+    ends = _find_ends(drawn_points(sketch.heights))
+    colors = Colors(sketch.heights, (0.0, lx, 0.0, ly), Axis("height", "m"), *ends, "cividis")
+    profiles = [("along x", found.qx, found.psd_x, 0), ("along y", found.qy, found.psd_y, 1)]
+    kinds = [("measured", sketch.measured, 1), ("on the grid", found, 0)]
+    directions = [(name, each.q, each.psd_2d, number) for name, each, number in kinds if each is not None]
     return {
-        "map of the heights": _map(sketch),
+        "map of the heights": Panel("map", Axis("x", "m"), Axis("y", "m"), colors=colors),
         "distribution of the heights": _distribution(sketch),
-        "spectra of profiles": _profiles(sketch),
-        "spectrum over directions": _over_directions(sketch),
+        "spectra of profiles": _spectra(sketch, profiles, Axis("PSD of profiles", "m³")),
+        "spectrum over directions": _spectra(sketch, directions, Axis("PSD over directions [m⁴]")),
     }
-
-
-def _map(sketch: Sketch) -> Panel:
-    low, high = _find_ends(drawn_points(sketch.heights))
-    lx, ly = sketch.size
-    colors = Colors(sketch.heights, (0.0, lx, 0.0, ly), Axis("height", "m"), low, high, "cividis")
-    return Panel("map", Axis("x", "m"), Axis("y", "m"), colors=colors)
 
 
 def _find_ends(heights: Array) -> tuple[float, float]:
@@ -99,18 +98,6 @@ def _spectra(sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], of: A
     return Panel("spectrum", Axis("wavenumber [1/m]"), of, lines, log_x=True, log_y=True)
 
 
-def _profiles(sketch: Sketch) -> Panel:
-    found = sketch.found
-    spectra = [("along x", found.qx, found.psd_x, 0), ("along y", found.qy, found.psd_y, 1)]
-    return _spectra(sketch, spectra, Axis("PSD of profiles", "m³"))
-
-
-def _over_directions(sketch: Sketch) -> Panel:
-    kinds = [("measured", sketch.measured, 1), ("on the grid", sketch.found, 0)]
-    spectra = [(name, each.q, each.psd_2d, number) for name, each, number in kinds if each is not None]
-    return _spectra(sketch, spectra, Axis("PSD over directions [m⁴]"))
-
-
 NOT_SELF_AFFINE = "no self-affine range was found"
 
 
@@ -127,9 +114,8 @@ def describe_surface(
     if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
         prepared = prepare(part, job.grid, whole)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
-        measured = surface_statistics.surface_statistics(
-            measured_maps.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size
-        )
+        treated = measured_maps.treat(prepared.cut, part.detrend, "smooth")
+        measured = surface_statistics.surface_statistics(treated.heights, prepared.size)
         lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
         lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")

@@ -5,7 +5,7 @@ sweep_mean.csv and sweep_curves_mean.csv contain means over seeds.
 
 import fcntl
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from statistics import fmean, stdev
@@ -14,7 +14,7 @@ from typing import Any
 from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_of, to_csv
 from ..errors import InputError
 from ..files import files, outputs, tables
-from ..job import Case, Steady
+from ..job import Case
 from ..job.history import Timeline
 from ..job.listing import answers
 from . import slide
@@ -124,9 +124,8 @@ def _points(case: Case) -> Iterator[dict[str, Any]]:
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
         for k, place in enumerate(tables.of_table(columns)):
-            places = {
-                name: float(f"{value:.9g}") for name, value in zip(PLACES, place, strict=True)
-            }  # without rounding errors
+            values = (float(f"{value:.9g}") for value in place)  # without rounding errors
+            places = dict(zip(PLACES, values, strict=True))
             yield head | places | {name: columns[name][k] for name in numbers}
 
 
@@ -151,22 +150,16 @@ def state(case: Case) -> str:
     if not (columns := _columns(table)):
         return DAMAGED
     if not case.job.history:
-        return "begun" if _points_lack(case.job.steady, columns) else "done"
+        if section := case.job.steady:
+            asked = tables.requested_points(section.velocities, section.pressures or (), section.temperatures or ())
+            if tables.lacking_points(asked, tables.of_table(columns)):
+                return "begun"
+        return "done"
     if case.job.bands is not None:  # its rows are written at the end
         return "done"
     steps = [int(step) for step in columns["step"]]
     timeline = Timeline.from_job(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
     return "done" if steps and (steps[-1] >= len(timeline) or tables.detached(directory)) else "begun"
-
-
-def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
-    """Return True if a friction curve lacks requested points."""
-    asked = (
-        tables.requested_points(section.velocities, section.pressures or (), section.temperatures or ())
-        if section
-        else ()
-    )
-    return bool(tables.lacking_points(asked, tables.of_table(columns)))
 
 
 def _means(
