@@ -53,13 +53,16 @@ FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
 SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
 
 
-def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
+def _excluded(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
     if adhesion is None:
         return
     if material.hardness is not None:
         yield Fault("cannot be used with adhesion: leave one of them out", ("material", "hardness"))
     if adhesion.range == AUTO and material.fitted.long_modulus == 0.0:
         yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
+    if bands is not None:
+        yield Fault("cannot be used with bands: they are coupled by pressures alone", ("adhesion",))
+    yield from limits.no_strip("adhesion", grid)
 
 
 def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
@@ -146,15 +149,6 @@ class AdhesionMemory:
     columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
 
 
-def _no_strip(adhesion: Any, grid: Any) -> Iterator[Fault]:
-    return limits.no_strip("adhesion", grid) if adhesion is not None else iter(())
-
-
-def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
-    if adhesion is not None and bands is not None:
-        yield Fault("cannot be used with bands: they are coupled by pressures alone", ("adhesion",))
-
-
 WARN_RANGE_FOLLOWS_CELLS = Kind(
     "range follows cells",
     "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
@@ -168,8 +162,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
-    in_bands_over_time: ClassVar[bool] = True  # `_no_bands` refuses them
-    rules: ClassVar[tuple[Rule, ...]] = rules_of(_bodies, _zone_is_resolved, _no_bands, _no_strip)
+    in_bands_over_time: ClassVar[bool] = True  # `_excluded` refuses them
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_excluded, _zone_is_resolved)
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
     forbids: ClassVar[Mapping[str, str]] = {
         EXTRAPOLATION: "contacts with adhesion start from the last gaps",
