@@ -316,9 +316,11 @@ class AdhesiveLaw:
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)
         contact, gap = walk.contact, memory.spare
-        pasts = PastGap(gap, step.position, True), memory.pasts[0]
+        last, changed = memory.pasts[0], 0.0
+        pasts = PastGap(gap, step.position, True), last
         now = AdhesiveMemory(pasts, memory.pasts[1].gap, memory.gap_backup, memory.free_correction, trial.alpha)
-        changed = self._count_changes(law, *now.pasts)
+        if last.known:
+            changed = self.slab.sum(float(np.count_nonzero(law.touches(last.gap) != law.touches(gap))))[0]
         end: End = "detached" if walk.detached else "equilibrium"
         snapped, remark = walk.snapped, ""
         if walk.detached and self._goes_on_open:
@@ -442,12 +444,6 @@ class AdhesiveLaw:
 
     def _highest(self, trial: Trial) -> float:
         return self.slab.reduce((), [float(trial.effective.max(initial=-np.inf))])[0]
-
-    def _count_changes(self, law: Law, now: PastGap, before: PastGap) -> float:
-        """Return the number of points that came into contact or left it; collective."""
-        if not before.known:
-            return 0.0
-        return self.slab.sum(float(np.count_nonzero(law.touches(before.gap) != law.touches(now.gap))))[0]
 
     def _tension(self, law: Law, p: Array, alpha: float) -> dict[str, float]:
         """Return the share of points under tension and the force of all tension [N]; collective."""

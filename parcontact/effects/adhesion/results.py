@@ -75,14 +75,11 @@ def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> l
     last = len(area) if detached else len(area) - 1  # last row at which a contact may be lost
     pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
-    zone, areas = ZONE.value * coarseness**ZONE.order, np.asarray(columns["error_area"], float)
-    found = []
-    for pull in pulls:
-        if pull.pressure < least[pull.row]:
-            known = areas[: pull.row + 1]
-            known = known[known == known]
-            area = float(np.median(known)) if known.size else math.nan
-            found.append(pull._replace(mesh=PULL_OFF.value * area + zone))
+    zone, found = ZONE.value * coarseness**ZONE.order, []
+    for pull in (pull for pull in pulls if pull.pressure < least[pull.row]):
+        known = [error for error in columns["error_area"][: pull.row + 1] if error == error]
+        mesh = PULL_OFF.value * float(np.median(known)) + zone if known else math.nan
+        found.append(pull._replace(mesh=mesh))
     return found
 
 

@@ -172,24 +172,19 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return self._friction.shifted(self._scene.time_factor).stress(way / dt)
 
     def _start(self, instant: Instant, memory: StickMemory, strength: float) -> BoundedTraction:
-        """Return the bounds of a step and tractions to start from, in the spare maps; local."""
-        (t, bound), last = memory.spare, memory.last
-        self._fill_bound(instant, strength, bound)
-        scale = memory.alpha / instant.modulus, instant.step.growth
-        solver.extrapolate_tractions(
-            *components(last.traction), last.bound, *scale, bound, *memory.share, *components(t)
-        )
-        return memory.spare
-
-    def _fill_bound(self, instant: Instant, strength: float, bound: Array) -> None:
-        """Put `f/alpha` into a map. A shear strength acts on the corrected contact area, as without stick."""
+        """Return the bounds `f/alpha` of a step, and tractions from which its solve starts, in the spare maps; local.
+        A shear strength acts on the corrected contact area, as without stick."""
+        (t, bound), last, measures = memory.spare, memory.last, instant.measures
         if self._law.coefficient is not None:
             np.multiply(instant.pressure, self._law.coefficient, out=bound)
         else:
-            measures = instant.measures
             share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
             bound[:] = strength * share / (instant.modulus * self._scene.units.pressure)
         bound[(instant.touching == 0) | (bound < LEAST_BOUND)] = 0.0
+        scale = memory.alpha / instant.modulus, instant.step.growth
+        past = *components(last.traction), last.bound
+        solver.extrapolate_tractions(*past, *scale, bound, *memory.share, *components(t))
+        return memory.spare
 
     def _stiffness(self, instant: Instant) -> float:
         """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective.

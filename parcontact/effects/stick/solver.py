@@ -87,10 +87,11 @@ def shorten_to_bounds(bound, x, y, hit):
 
 @loop
 def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mean_x, mean_y, x, y):
-    """Replace the tractions (x, y) of two steps ago by a start for this step, extrapolated from the last tractions.
+    """Replace the tractions (x, y) of two steps ago by tractions from which the solve of this step starts.
 
-    Tractions that slipped stay at their bounds, others are multiplied by `factor`; both get `growth` times their last
-    change. Points new in contact get the mean share (mean_x, mean_y) of their bounds.
+    First `growth` times the last change of a traction is added to the last traction. Then a traction that slipped is
+    scaled to its new bound, and any other traction is multiplied by `factor`. A point that has just come into contact
+    gets the share (mean_x, mean_y) of its bound.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
