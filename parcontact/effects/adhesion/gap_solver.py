@@ -148,16 +148,12 @@ def press(g, q, sigma, step, image):
 @loop
 def pressure_residual(g, q, sigma, mean, working, c):
     """Put `q + mean + sigma` into c on the working set (open points, and closed points under tension), 0 elsewhere.
-    Return the size of the set, the sum of c, the sum of sigma over all points, and the largest -g."""
+    Return the size of the set, the sum of c, and the sum of sigma over all points."""
     count, total, attracted = 0.0, 0.0, 0.0
-    lowest, deepest = np.empty(g.shape[1]), -np.inf
-    for i in range(lowest.size):
-        lowest[i] = np.inf
     for j in range(g.shape[0]):
         row_count, row_total, row_attracted = 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
             pushed = q[j, i] + mean + sigma[j, i]
-            lowest[i] = min(lowest[i], g[j, i])
             row_attracted += sigma[j, i]
             inside = (g[j, i] > 0.0) | (pushed < 0.0)
             working[j, i] = inside
@@ -167,9 +163,7 @@ def pressure_residual(g, q, sigma, mean, working, c):
         count += row_count
         total += row_total
         attracted += row_attracted
-    for i in range(lowest.size):
-        deepest = max(deepest, -lowest[i])
-    return count, total, attracted, deepest
+    return count, total, attracted
 
 
 @loop
@@ -469,7 +463,7 @@ class GapSolver:
             lowest = 0.0 if count else self.slab.reduce((), [float((-q).max(initial=-np.inf))])[0]
             it.m = -total / count if count else lowest - it.law.strength  # in full contact the least that keeps it
         sums = pressure_residual(g, q, sigma, it.m, self._working, self._way)
-        members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
+        members, total, attracted, least = self.slab.reduce(sums, [-float(g.min(initial=np.inf))])
         if it.given is not None and members:
             it.m -= total / members
             kernels.turn(self._working, self._way, 0.0, total / members, self._way)
