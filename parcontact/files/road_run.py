@@ -7,6 +7,7 @@ with the next march. `--until T` ends the history at T; a longer history needs n
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -153,9 +154,10 @@ class _Run:
         rows = hdf5.write_on_root(self.slab, self._write, f"cannot write {self.directory.path / outputs.RUN.table}")
         self.road.forget()
         if self.slab.root:
-            run = Results(self.directory.path, "run", self.job)
-            for text in slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, run.table):
-                self._say(text)
+            with suppress(OSError, InputError):  # an unreadable table does not end a run
+                table = Results(self.directory.path, "run", self.job).table
+                for text in slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, table):
+                    self._say(text)
         for text in sum_up_errors(rows, self.job.numerics.asked.both):
             self._say(text)
         self._say(f"done: results in {self.directory.path}")

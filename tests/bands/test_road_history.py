@@ -239,6 +239,10 @@ def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyP
     friction = np.reshape(bands["friction"], (-1, 2)).sum(axis=1)
     assert np.abs(friction) == pytest.approx(np.array(table["friction"])[1:], abs=1e-12)
     assert np.reshape(bands["time"], (-1, 2))[:, 0] == pytest.approx(np.array(table["time"])[1:])
+    log = Path("out/job/run.log").read_text()
+    ends = ("mu_max, the highest", "mu_dyn, the mean", "error of friction", "error of contact area", "done: results")
+    assert [log.count(text) for text in ends] == [1] * 5
+    assert sorted(ends, key=log.index) == list(ends)
     before = Path("out/job/measures.csv").stat().st_mtime_ns
     assert main(["job.yaml", "--quiet"]) == 0
     assert main(["job.yaml", "--quiet", "--set", "history.1.velocity=2.0"]) == 2
