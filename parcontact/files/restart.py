@@ -97,9 +97,10 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
         return problem
     if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
         keys = on_root(slab.comm, lambda: tables.list_differences(tables.differences(found.job, plain, ["history"])))
+        keys = f" ({keys})" if keys else ""
         other = f"to change what follows, end the running stage at t = {found.time:g} s and add another; or"
         earlier = "give --restart PATH to continue from an earlier checkpoint"
-        raise InputError(f"{path}: {difference} ({keys}); {other} {ADVICE}, {earlier}")
+        raise InputError(f"{path}: {difference}{keys}; {other} {ADVICE}, {earlier}")
     return found
 
 

@@ -16,7 +16,7 @@ from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Benc
 
 from parcontact.__main__ import main
 from parcontact.errors import InputError
-from parcontact.files import checkpoint, tables
+from parcontact.files import checkpoint, restart, tables
 from parcontact.files.provenance import read_budget
 from parcontact.files.run import chosen_by_accuracy
 from parcontact.job import Job
@@ -240,6 +240,14 @@ def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: 
     assert max(of_one.count(message) for of_one in str(raised.value).split("step-")) == 1  # for each checkpoint
     assert "give --restart never to start from the beginning" in str(raised.value)
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_changed_step_of_the_same_history(stopped: tuple[Bench, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps may differ although no key of the history does: no empty list of keys is shown."""
+    bench, out = stopped
+    monkeypatch.setattr(restart, "find_changed_step", lambda contents, job: "step 1 differs")
+    with pytest.raises(InputError, match="step 1 differs; to change what follows"):
+        bench.run(bench.job("viscoelastic"), out)
 
 
 def test_results_beyond_a_shorter_history(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
