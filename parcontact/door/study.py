@@ -30,7 +30,7 @@ from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
 from ..errors import FAILED, STOPPED_EARLY, InputError
-from ..files import files, run, sweep, sweep_warnings, tables
+from ..files import files, outputs, run, sweep, sweep_warnings, tables
 from ..files.directory import Directory
 from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
@@ -424,7 +424,7 @@ def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: 
     sweep_table.save_cases(place / "study.csv", names_of(STUDY), table)
     lines = [*describe_choices(job), *map(str, limits(refined, rows))]
     lines += sentences(rows, reference, ranks)
-    files.replace_file(place / "study.txt", "\n".join(lines) + "\n")
+    files.replace_file(place / outputs.STUDY_TEXT, "\n".join(lines) + "\n")
     doubts = {name: limit.doubt for name, limit in reference.items()}
     compound_files.plot_study(place, _curves(refined, rows, errors), doubts)
     return lines

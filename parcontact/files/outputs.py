@@ -36,13 +36,16 @@ class Outputs:
 
 STOP = "stop"  # name of the stop file of a run or a sweep
 MARCHES = "checkpoint/marches.json"  # finished marches of bands
-BANDS, WAVES = "bands.csv", "steady_waves.csv"
+BANDS, WAVES, CYCLES = "bands.csv", "steady_waves.csv", "cycles.csv"
+LOST = "steady.lost.json"  # points of a friction curve without a solution
+SWEPT_CURVES = "sweep_curves.csv"  # the points of all friction curves of a sweep
+STUDY_TEXT, STUDY_PICTURE = "study.txt", "convergence.png"
 STEADY_THEORY, BANDS_THEORY = "steady_theory.csv", "bands_theory.csv"
 
 RUN = Outputs(
     "a run",
     "measures.csv",
-    tables=("cycles.csv", BANDS),
+    tables=(CYCLES, BANDS),
     maps="fields.h5",
     log="run.log",
     others=("fields.xdmf", MARCHES),
@@ -56,13 +59,13 @@ STEADY = Outputs(
     tables=(WAVES, BANDS, STEADY_THEORY, BANDS_THEORY),
     maps="steady.h5",
     log="steady.log",
-    others=("steady.lost.json",),
+    others=(LOST,),
     copies=("steady.job.yaml", "steady.resolved.yaml"),
     complete="its curve has {} points",
 )
-SWEEP = Outputs("a sweep", "sweep.csv", tables=("sweep_curves.csv", "sweep_mean.csv", "sweep_curves_mean.csv"))
+SWEEP = Outputs("a sweep", "sweep.csv", tables=(SWEPT_CURVES, "sweep_mean.csv", "sweep_curves_mean.csv"))
 STUDY = Outputs(
-    "a study", "study.csv", others=("study.txt", "convergence.png"), copies=("study.job.yaml", "study.resolved.yaml")
+    "a study", "study.csv", others=(STUDY_TEXT, STUDY_PICTURE), copies=("study.job.yaml", "study.resolved.yaml")
 )
 THEORY = Outputs("a theory", "theory.csv", tables=(STEADY_THEORY, BANDS_THEORY), others=("theory.yaml",))
 BY_VERB = {"run": RUN, "steady": STEADY, "sweep": SWEEP, "study": STUDY, "theory": THEORY}

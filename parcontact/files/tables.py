@@ -262,7 +262,6 @@ def is_same(one: Place, other: Place) -> bool:
     return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
 
 
-(FILE,) = outputs.STEADY.others
 PLACE = ("velocity", "pressure", "temperature")
 
 
@@ -275,7 +274,7 @@ class LostPoint(NamedTuple):
 
 def read(directory: Path) -> list[LostPoint]:
     """Return the lost points of a curve, except points that were solved later; raises InputError for a damaged file."""
-    path = directory / FILE
+    path = directory / outputs.LOST
     if not path.is_file():
         return []
     try:
@@ -296,11 +295,11 @@ def without(lost: Sequence[LostPoint], solved: Sequence[Wanted]) -> list[LostPoi
 def write(directory: Path, lost: Sequence[LostPoint]) -> None:
     """Write the lost points of a curve, or remove the file if there is none; raises OSError."""
     if not lost:
-        (directory / FILE).unlink(missing_ok=True)
+        (directory / outputs.LOST).unlink(missing_ok=True)
         return
     data = [dict(zip((*PLACE, "why"), (*at, why), strict=True)) for at, why in lost]
     known = [{name: value for name, value in one.items() if value == value} for one in data]  # without NaN
-    files.replace_file(directory / FILE, json.dumps(known, indent=1) + "\n")
+    files.replace_file(directory / outputs.LOST, json.dumps(known, indent=1) + "\n")
 
 
 def name_lost(directory: Path) -> str:

@@ -471,7 +471,7 @@ class _Curve:
         self._say(f"parcontact: {error}")
         why = error.reason if isinstance(error, UnsolvedError) else str(error)
         act = lambda: self.table.lose(wanted, why) if self.table else None  # noqa: E731
-        hdf5.write_on_root(self.slab, act, f"cannot write {self.directory.path / tables.FILE}")
+        hdf5.write_on_root(self.slab, act, f"cannot write {self.directory.path / outputs.LOST}")
         self.sliding.forget()
 
     def _solve(self, index: int) -> None:

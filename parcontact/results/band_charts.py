@@ -27,7 +27,7 @@ from ..parallel.slab import Array
 from . import style
 from .panels import Axis, ColumnPanel, Line, Panel, entry, offered
 from .plotted_run import FRACTION, PlottedRun, count_different, round_digits, to_contact_area, to_load
-from .results import CURVES, PLACES, Results, read_cases, swept_keys
+from .results import PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
 from .sweep_table import SAMPLES
 
@@ -305,7 +305,7 @@ def panels_of_sweep(directory: Path) -> list[Panel]:
     rows, place = read_cases(table), names_of(SWEEP).index
     panels = sorted((*PANELS, *offered("SWEEP_PANELS")), key=lambda panel: place(next(iter(panel.columns.values()))))
     keys = [name for name in _drop_joint_keys(rows, _swept(rows)) if all(isinstance(row[name], float) for row in rows)]
-    if table.name == CURVES:
+    if table.name == outputs.SWEPT_CURVES:
         panels = list(CURVE_PANELS)
         places = {name: {row[name] for row in rows if row[name] == row[name]} for name in PLACES}
         keys = [name for name, values in places.items() if len(values) > 1] + keys

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..files import files, hdf5
+from ..files import files, hdf5, outputs
 from ..parallel.slab import Array
 from ..rubber.compound import TITLE, Compound
 from ..rubber.series import log_factors, reduce_sets
@@ -160,7 +160,7 @@ def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[st
     if not drawn:
         return None
     with style.drawing():
-        return style.save_figure(_convergence(drawn, doubts), directory / "convergence.png")
+        return style.save_figure(_convergence(drawn, doubts), directory / outputs.STUDY_PICTURE)
 
 
 def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Figure:

@@ -266,7 +266,7 @@ PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directo
     outputs.RUN.maps: _saved_maps,
     **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
     outputs.SWEEP.table: _sweep,
-    "study.txt": lambda _: iter(["  study: errors and costs of settings are in study.txt"]),
+    outputs.STUDY_TEXT: lambda _: iter([f"  study: errors and costs of settings are in {outputs.STUDY_TEXT}"]),
 }
 
 

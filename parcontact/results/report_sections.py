@@ -213,7 +213,7 @@ def _span(ends: Sequence[float], unit: str) -> str:
     return " to ".join(quantity(end, unit) for end in ends)
 
 
-STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
+STUDY_PICTURES = {outputs.STUDY_PICTURE: "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
 SHOWN = (
     *("friction", "contact_area", "approach", "mean_gap", "max_pressure"),

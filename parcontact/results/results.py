@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import xarray
 
 JOBS = [each.resolved for each in outputs.BY_VERB.values() if each.copies]
-CURVES = outputs.SWEEP.tables[0]  # the points of all friction curves of a sweep
 PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *ERRORS, "residual")
@@ -183,7 +182,8 @@ class Results:
     def points(self) -> Path:
         """Path of the table with the results of a sweep: of its cases, or of the points of its curves."""
         known = any(math.isfinite(row.get("residual", math.nan)) for row in self.cases)
-        return self.path / (CURVES if self.has(CURVES) and not known else outputs.SWEEP.table)
+        curves = self.has(outputs.SWEPT_CURVES) and not known
+        return self.path / (outputs.SWEPT_CURVES if curves else outputs.SWEEP.table)
 
     @property
     def study_rows(self) -> Rows:
@@ -197,10 +197,10 @@ class Results:
     @property
     def sentences_of_study(self) -> list[str]:
         """Sentences on a study; empty before it is finished."""
-        if not self.has("study.txt"):
+        if not self.has(outputs.STUDY_TEXT):
             return []
-        tables.refuse_cut(self.path / "study.txt")
-        return (self.path / "study.txt").read_text(errors="replace").splitlines()
+        tables.refuse_cut(self.path / outputs.STUDY_TEXT)
+        return (self.path / outputs.STUDY_TEXT).read_text(errors="replace").splitlines()
 
     @property
     def unfinished(self) -> list[str]:

@@ -483,7 +483,7 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
     files.replace_file(
-        directory / outputs.RUN.tables[0], to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found))
+        directory / outputs.CYCLES, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found))
     )
     yield from describe_cycles(job, found)
 

@@ -18,7 +18,7 @@ from ..job import Case
 from ..job.history import Timeline
 from ..job.listing import answers
 from . import slide
-from .results import CURVE_COLUMNS, CURVE_RESULTS, CURVES, FAILURE, PLACES, Results
+from .results import CURVE_COLUMNS, CURVE_RESULTS, FAILURE, PLACES, Results
 
 RESULTS = names_of(SWEEP_RESULTS)
 SECTIONS = {column.when: added_names(SWEEP, column.when) for column in SWEEP if column.when}
@@ -43,7 +43,7 @@ def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
             names = tuple(name for name in names if any(name in row for row in rows))
         save_cases(directory / outputs.SWEEP.table, ["case", *keys, *names], rows)
         if points:
-            save_cases(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
+            save_cases(directory / outputs.SWEPT_CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
             save_cases(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *more, *THEORY]))
         if seeded and points:
