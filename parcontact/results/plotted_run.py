@@ -203,7 +203,7 @@ def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)
 
 
-EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
+EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless: it becomes logarithmic
 FEW_ROWS = 8
 STAGE_WHITE = 0.87  # share of white in the shade of a stage
 LENGTHS = (
@@ -249,7 +249,8 @@ def panels_of_run(run: PlottedRun, over: str = "") -> list[Panel]:
     if not run.curves:
         return []
     along = _choose_abscissa(run, over)
-    log = along.axis.unit == "s" and _steps_grow(along.values)
+    later = along.values[along.values > 0.0] if along.axis.unit == "s" else np.zeros(0)
+    log = later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
     found = [replace(panel, shades=along.shades, log_x=log) for panel in _find_panels(run, along)]
     if along.marked or along.loop:
         return found
@@ -288,22 +289,14 @@ def _panels_of_loops(run: PlottedRun) -> Iterator[Panel]:
         elif stage.frequency and (way := way_along(stage, columns, starts[number])) is not None:
             friction = friction_along(stage, columns) / (run.area * columns["pressure"])
             frictions.append(Line(name, way, friction, look))
+    loads, frictions = (
+        lines if len(lines) > 1 else [replace(line, name="") for line in lines] for lines in (loads, frictions)
+    )
     if loads:
-        yield Panel("loop", Axis("approach", "m"), load_axis, _named_if_many(loads), bottom=False)
+        yield Panel("loop", Axis("approach", "m"), load_axis, loads, bottom=False)
     if frictions:
         axes = Axis("displacement along the velocity", "m"), Axis("friction coefficient\nalong the velocity")
-        yield Panel("loop", *axes, _named_if_many(frictions))
-
-
-def _named_if_many(lines: list[Line]) -> list[Line]:
-    """Return lines, without a name if there is one only."""
-    return lines if len(lines) > 1 else [replace(line, name="") for line in lines]
-
-
-def _steps_grow(times: Array) -> bool:
-    """Return True if most rows are so early that only a logarithmic axis separates them."""
-    later = times[times > 0.0]
-    return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
+        yield Panel("loop", *axes, frictions)
 
 
 def _add_theory(panel: Panel, run: PlottedRun) -> Panel:

@@ -55,6 +55,8 @@ DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over whi
 SAME_INSTANT = 1e-9  # rounding: relative difference below which instants are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
+RELATIVE = {"friction": ERRORS[:1], CORRECTED: ERRORS[1:]}  # column of the relative error of a column
+NOT_IN_ALL = (CORRECTED, *ERRORS, "force_x", "force_y")  # columns that some tables lack
 CUT_OFF = "cut_off"
 
 
@@ -92,9 +94,7 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
     rows = _inside(columns, every)
     if rows.size < min(every.size, 2):
         return Slide(*[math.nan] * len(Slide._fields))
-    unknown = [math.nan] * len(columns["time"])
-    series = columns["distance"], columns["friction"], columns["contact_area"], columns.get(CORRECTED, unknown)
-    distance, friction, *areas = (np.asarray(each)[rows] for each in series)
+    distance, friction, *areas = _at(columns, rows, "distance", "friction", "contact_area", CORRECTED)
     if distance.size < 2 or distance[-1] == distance[0]:
         return None
     touching = [mean_over_end(distance, area) for area in areas]
@@ -106,17 +106,21 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
     return Slide(float(friction[highest]), float(distance[highest] - start), mean, *touching)
 
 
+def _at(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], *names: str) -> list[Array]:
+    """Return columns in some rows; NaN for a missing column that not all tables have."""
+    unknown = {name: [math.nan] * len(columns["time"]) for name in NOT_IN_ALL if name not in columns}
+    return [np.asarray(unknown.get(name) or columns[name], float)[rows] for name in names]
+
+
 def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the rows, except the first, that have a tangential force and no load, or a tensile one."""
-    friction = np.asarray(columns["friction"], float)[rows]
+    (friction,) = _at(columns, rows, "friction")
     return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
 
 
 def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the tangential force of some rows [N]; 0 in tables without one."""
-    none = np.zeros(len(columns["friction"]))
-    x, y = (np.asarray(columns.get(name, none), float)[rows] for name in ("force_x", "force_y"))
-    return np.hypot(x, y)
+    return np.hypot(*np.nan_to_num(_at(columns, rows, "force_x", "force_y")))
 
 
 def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
@@ -128,9 +132,9 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
     rows = _during(history, columns)
     if not math.isnan(known.get(ERRORS[0], math.nan) + slid.mu_dyn):
         found["mu_max"] = _highest(columns, rows, cell)[1]
-        found["mu_dyn"] = mean_of_slide(columns, rows, "friction", ERRORS[0])[1]
+        found["mu_dyn"] = mean_of_slide(columns, rows, "friction")[1]
     if CORRECTED in columns and not math.isnan(known.get(ERRORS[1], math.nan)):
-        found["contact_area"] = mean_of_slide(columns, rows, CORRECTED, ERRORS[1])[1]
+        found["contact_area"] = mean_of_slide(columns, rows, CORRECTED)[1]
     return found
 
 
@@ -152,10 +156,10 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
     rows, found = _during(history, columns), dict[str, float]()
     if _cuts(columns, rows):
         return dict.fromkeys(ERRORS, math.nan)
-    far, friction = np.diff(np.asarray(columns["distance"], float)[rows]), np.asarray(columns["friction"], float)
-    for name, weight in zip(ERRORS, (friction, np.ones(friction.size)), strict=True):
-        error = np.asarray(columns.get(name, np.full(weight.size, np.nan)), float)[rows[1:]]
-        counted = np.where(np.isnan(error), 0.0, far * weight[rows[1:]])
+    distance, friction, *errors = _at(columns, rows, "distance", "friction", *ERRORS)
+    weights = np.diff(distance) * friction[1:], np.diff(distance)
+    for name, error, weight in zip(ERRORS, (each[1:] for each in errors), weights, strict=True):
+        counted = np.where(np.isnan(error), 0.0, weight)
         found[name] = float(np.nansum(counted * error) / counted.sum()) if counted.any() else math.nan
     return found
 
@@ -180,19 +184,16 @@ def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> fl
 
 def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> tuple[float, float, float]:
     """Return the highest friction of some rows, its error, and the part of the error that is the ripple."""
-    friction = np.asarray(columns["friction"], float)[rows]
+    distance, friction, error = _at(columns, rows, "distance", "friction", ERRORS[0])
     at = int(np.argmax(friction[1:])) + 1
-    error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
-    wave = ripple(np.asarray(columns["distance"], float)[rows], friction, at, cell)
-    return float(friction[at]), wave + float(error), wave
+    wave = ripple(distance, friction, at, cell)
+    return float(friction[at]), wave + float(error[at] * friction[at]), wave
 
 
-def mean_of_slide(
-    columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str
-) -> tuple[float, float]:
+def mean_of_slide(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str) -> tuple[float, float]:
     """Return the mean of a column over the last three quarters of a slide, and of its errors; unknown errors are 0."""
-    distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
-    within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
+    distance, values, *errors = _at(columns, rows, "distance", name, *RELATIVE.get(name, ()))
+    within = np.abs(values) * np.nan_to_num(errors[0] if errors else np.zeros(values.size))
     return mean_over_end(distance, values), mean_over_end(distance, within)
 
 
@@ -203,7 +204,8 @@ def describe_slide(
 
     `cell` is the spacing of the grid along x [m]. Until the last slide begins, sentences are about the slide before.
     """
-    last, begun = _slide(history), _begun(history, columns["time"])
+    last, starts = _slide(history), np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
+    begun = int(np.count_nonzero(starts < columns["time"][-1] * (1.0 - SAME_INSTANT))) if columns["time"] else 0
     not_begun = begun <= last.start
     so_far = history[:begun] if not_begun else history
     found = measure_slide(so_far, columns)
@@ -222,14 +224,11 @@ def describe_slide(
         columns = {name: column for name, column in columns.items() if name not in ERRORS}
     if math.isnan(found.contact_area):
         return
-    yield from (
-        _describe_friction(found, cell, columns, rows)
-        if found.mu_dyn == found.mu_dyn
-        else _describe_force(columns, rows)
-    )
+    defined = found.mu_dyn == found.mu_dyn
+    yield from _describe_friction(found, cell, columns, rows) if defined else _describe_force(columns, rows)
     area = f"{found.contact_area:.4g} by counting points"
     if CORRECTED in columns:
-        area = f"{with_error(*mean_of_slide(columns, rows, CORRECTED, ERRORS[1]))} corrected for its edges, and {area}"
+        area = f"{with_error(*mean_of_slide(columns, rows, CORRECTED))} corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
     for said_of in answers("results", "said_of_slide"):
         yield from said_of(columns, rows)
@@ -255,7 +254,7 @@ def _describe_friction(
     error = wave if math.isnan(error) else error
     rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
     yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
-    length, dynamic = quantity(way, "m"), with_error(*mean_of_slide(columns, rows, "friction", ERRORS[0]))
+    length, dynamic = quantity(way, "m"), with_error(*mean_of_slide(columns, rows, "friction"))
     yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
     yield from _unsettled(columns, rows)
 
@@ -263,7 +262,7 @@ def _describe_friction(
 def _describe_force(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
     """Yield a sentence on the tangential force of a slide without defined friction."""
     force, steps = _tangential(columns, rows), _without_load(columns, rows).size
-    mean = mean_over_end(np.asarray(columns["distance"], float)[rows], force)
+    mean = mean_over_end(_at(columns, rows, "distance")[0], force)
     where = f"in {steps} of {len(rows) - 1} steps of the slide, which have no load, and is 0 in the table"
     size = f"{quantity(force[1:].max(), 'N')} at most, and {quantity(mean, 'N')} on average over the last"
     yield f"friction is not defined {where}: the tangential force is {size} three quarters of the slide"
@@ -272,10 +271,7 @@ def _describe_force(columns: Mapping[str, Sequence[float]], rows: NDArray[np.int
 def _unsettled(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
     """Yield a sentence if friction of the two halves of the last three quarters differs by more than its known errors;
     steady sliding has one friction."""
-    distance, friction, errors = (
-        np.asarray(columns.get(name, np.full(len(columns["friction"]), np.nan)), float)[rows]
-        for name in ("distance", "friction", ERRORS[0])
-    )
+    distance, friction, errors = _at(columns, rows, "distance", "friction", ERRORS[0])
     second = mean_over_end(distance, friction, DYNAMIC / 2)
     first = 2.0 * mean_over_end(distance, friction) - second
     if abs(second - first) > mean_over_end(distance, np.abs(friction) * errors):
@@ -303,12 +299,6 @@ def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error:
             f"their estimated errors together, {allowed:.2g}. As velocity and load are the same, they should agree: "
             "try shorter time steps and a smaller numerics.tolerance"
         )
-
-
-def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
-    """Return the number of stages that have begun by the last time."""
-    starts = np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
-    return int(np.count_nonzero(starts < times[-1] * (1.0 - SAME_INSTANT))) if len(times) else 0
 
 
 def _slide(history: Sequence[Stage]) -> range:
