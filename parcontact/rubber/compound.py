@@ -65,9 +65,14 @@ class Compound:
 
     def doubts(self) -> list[str]:
         """Return warnings about a misfit larger than the scatter, and about tables that are not of rubber."""
-        from .moduli import odd_moduli
+        from . import moduli
 
         series, found = self.series, list(self.measured.doubts)
+        if self.measured.kind == "frequency" and series.band[1] < moduli.ONE_FREQUENCY * series.band[0]:
+            found.append(
+                f"all its points are at one frequency, {series.band[0] / (2 * math.pi):.3g} Hz, and say nothing about "
+                "others: measure a sweep over frequencies"
+            )
         if series.error > POOR:
             found.append(
                 f"the fit misses the {self._weighed} by {per_cent(series.error)} (rms), more than {per_cent(POOR)}"
@@ -82,7 +87,7 @@ class Compound:
                 f"{per_cent(storage)} and {per_cent(loss)}, and neighbouring points of a sweep scatter by "
                 f"{per_cent(noise)}. Check the table, or fit one of them: --weight storage, or --weight loss"
             )
-        found += [*self._describe_loss(), *self._describe_free(), *self._gaps(), *odd_moduli(self.measured.sets)]
+        found += [*self._describe_loss(), *self._describe_free(), *self._gaps(), *moduli.odd_moduli(self.measured.sets)]
         given = () if self.found else (getattr(self.shift, "reference", None), *getattr(self.shift, "temperatures", ()))
         of_table = doubt_kelvin("temperatures of the table", self.measured.temperatures)
         return [*found, *map(str, of_table), *map(str, doubt_kelvin("temperatures of the shift", given))]

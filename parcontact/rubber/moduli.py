@@ -239,7 +239,14 @@ class _Table:
         """Add the moduli that follow from tan delta or the phase angle. Return the one that follows from the other, or
         ""."""
         if "delta" in self.values and "tan_del" not in self.values:
-            self.values["tan_del"], self.units["tan_del"] = np.tan(self._column("delta", ANGLES)), ""
+            angles = self._column("delta", ANGLES)
+            if (wrong := np.flatnonzero(angles >= math.pi / 2.0)).size:
+                row, unit = wrong[0], self.units["delta"]
+                got = f"{self.values['delta'][row]:g} {unit}, {math.degrees(angles[row]):.3g} degrees"
+                raise InputError(
+                    f"{self.path}:{self.lines[row]}: delta must be below 90 degrees, got {got}; is the unit right?"
+                )
+            self.values["tan_del"], self.units["tan_del"] = np.tan(angles), ""
         for letter in "EG" if "tan_del" in self.values else "":
             absolute, storage, loss = (f"{letter}_{part}" for part in ("abs", "stor", "loss"))
             if absolute in self.values and not {storage, loss} & self.values.keys():

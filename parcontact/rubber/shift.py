@@ -157,6 +157,8 @@ def read_shift(text: str, reference: float | None) -> str | Shift:
     if colon and name in ("wlf", "arrhenius"):
         if reference is None:
             raise InputError(f"--shift {text} needs --reference, the temperature [deg C] that its constants belong to")
+        if not reference > -ZERO:
+            raise InputError(f"--reference must be above {-ZERO:g} C, got {reference:g}")
         try:
             if name == "arrhenius":
                 return Arrhenius(_within(text, float(rest), *ENERGY), reference)

@@ -104,6 +104,13 @@ def test_sweeps_that_do_not_overlap(tmp_path: Path) -> None:
     assert compound.fitted(whole, 0.5, None, "wlf", 0.05).doubts() == []
 
 
+def test_one_frequency_is_no_sweep(tmp_path: Path) -> None:
+    """Such as a table over strain; a fit to it is one branch at this frequency."""
+    rows = [np.full(4, 10.0), np.linspace(2.0, 2.1, 4), np.full(4, 0.3)]
+    found = compound.fitted(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa]", rows), 0.5, None, "wlf", 0.05)
+    assert any(text.startswith("all its points are at one frequency, 10 Hz") for text in found.doubts())
+
+
 @pytest.mark.parametrize(("unit", "says"), [("GPa", "more than rubber has as a glass"), ("Pa", "softer than any")])
 def test_moduli_of_no_rubber(tmp_path: Path, unit: str, says: str) -> None:
     """The rubber's 1 GPa as a thousand of them; a plateau of 1 MPa and a glass of 1 GPa as 1 and 1000 Pa times 50."""

@@ -117,6 +117,7 @@ def test_laws_given(tmp_path: Path) -> None:
     [
         ("wlf:8,100", None, "", "needs --reference"),
         ("wlf:8", 20.0, "", "must be of the form wlf:C1,C2"),
+        ("wlf:8,100", -300.0, "", "--reference must be above -273.15 C, got -300"),
         ("arrhenius:much", 20.0, "", "must be of the form arrhenius:J/mol"),
         ("none.csv", None, "", "or a readable file"),
         ("factors.csv", None, "", "a table of T"),

@@ -269,6 +269,10 @@ BAD = {
     "endless": (GOOD.replace("3.6", "inf"), ":4: E_stor must be a finite number"),
     "negative storage": (GOOD.replace("3.6", "-3.6"), ":4: E_stor must be positive, got -3.6"),
     "negative loss": (GOOD.replace("0.6", "-0.6"), ":4: E_loss must be positive, got -0.6"),
+    "a phase angle of degrees in rad": (
+        "f[Hz] G*[MPa] delta[rad]\n1 2 0.5\n2 2 10\n3 2 1\n",
+        ":3: delta must be below 90 degrees, got 10 rad, 573 degrees; is the unit right?",
+    ),
     "zero rate": (GOOD.replace("0.1,", "0,"), ":3: f must be positive, got 0"),
     "a value too few": (GOOD.replace("1.0,3.6,0.6", "1.0,3.6"), ":4: 2 values where 3 columns are named"),
     "a value too many": (GOOD.replace("1.0,3.6", "1,0,3,6"), ":4: 5 values where 3 columns are named"),
