@@ -1,4 +1,4 @@
-"""Adhesion: surfaces that attract each other, and its columns in tables."""
+"""Adhesion: surfaces that attract each other. This module has the columns that adhesion adds to tables."""
 
 from ...column import Column, Table
 

@@ -1,4 +1,4 @@
-"""Contact law with adhesion, whose unknown is the gap, for periodic and free bodies.
+"""The contact law of surfaces that attract each other, for periodic and free bodies. Its unknown is the gap.
 
 Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
 last two gaps, extrapolated in time and moved with the surface by whole cells.
@@ -52,11 +52,11 @@ MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
 @dataclass(frozen=True)
 class FreeInverse:
-    """Inverse of the operator `free` of a free body, by conjugate gradients with the inverse for a `repeated` body,
-    which has the same Green's function up to half the box: a dozen steps give five digits. The energy of the error is
-    below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate results.
+    """Inverse of the operator `free` of a free body, by conjugate gradients. The preconditioner is the inverse for the
+    `repeated`, periodic body, which has the same Green's function up to half the box: a dozen steps give five digits.
 
-    If `means` is False, pressures have the mean 0, and mean displacements are ignored.
+    The energy of the error is below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate
+    results. If `means` is False, the mean of a displacement is ignored, and pressures have the mean 0.
     """
 
     slab: Slab
@@ -105,7 +105,8 @@ LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of
 
 @dataclass
 class AdhesiveSolver:
-    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic body."""
+    """Solver of contacts with adhesion, by the solver `gaps` for a periodic body. `free` is the operator A of a free
+    body, and None for a periodic one."""
 
     gaps: GapSolver
     workspace: Workspace
@@ -230,8 +231,8 @@ class PastGap(NamedTuple):
 class AdhesiveMemory:
     """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
 
-    `free_correction` is the correction for a free body (`gap_solver`) over the pressure, for the modulus `modulus`;
-    None for a periodic body. `end` has time and load of the detachment, None before it.
+    `free_correction` is `(A - B) p` of the last solve for a free body, with the pressure `modulus p` (see the module);
+    it is None for a periodic body. `end` has time and load of the detachment, and is None before it.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -244,10 +245,11 @@ class AdhesiveMemory:
 
 @dataclass(frozen=True)
 class LoadPath:
-    """Path of the prescribed load from the last step to the present one, in the units of the solver.
+    """Path of the prescribed load, an approach or a mean pressure, from the last step to the present one, in the run's
+    units for a body of modulus 1.
 
-    `before` is its value at the last step, `approach` and `pressure` are the last approach and mean pressure.
-    `closes_gap_first` is True for a compressive load on detached surfaces.
+    The load is `before` at the last step, and `control` at the present one. `approach` and `pressure` are the approach
+    and the mean pressure of the last step. `closes_gap_first` is True for a compressive load on detached surfaces.
     """
 
     before: float
@@ -294,7 +296,8 @@ class AdhesiveLaw:
         self._attraction = law_of(scene.job)
 
     def law(self, alpha: float) -> Law:
-        """Return the attraction in a step with the modulus alpha, in the units of the solver."""
+        """Return the law of attraction for a step with the modulus alpha: in the run's units, with its strength divided
+        by alpha."""
         law = self._attraction
         kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.scene.units.height
         return Law(kind, law.strength / (alpha * self.scene.units.pressure), law.range / unit, law.ramp / unit)
@@ -377,10 +380,11 @@ class AdhesiveLaw:
             backup[...] = gap
 
     def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return the mean motion of the edges of contact in a step [half process zones].
+        """Return by how much the edges of contact have moved in a step, in half process zones.
 
-        The motion in cells is the number of points that entered or left contact, divided by the length of the edge,
-        pi/4 of the cell sides along it. A contact is `untouched` if its load is at most an error of the solver.
+        This motion in cells is the number of points that entered or left the contact, divided by the length of its
+        edge, which is pi/4 of the number of cell sides along it. A contact whose load is at most an error of the solver
+        counts as `untouched`.
         """
         least = LEAST_LOAD * self._attraction.strength
         separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])

@@ -96,8 +96,9 @@ def _kind(tabor: float) -> str:
 class AdhesiveEnergies(NamedTuple):
     """Energies [J] since the start of a run with adhesion.
 
-    `work` of the rigid surface; energy of the `surfaces`, 0 at large gaps; energy `lost` in snaps; `error`, the sum
-    over all steps without a snap of the difference between work and energies.
+    `work` is the work that the rigid surface has done. `surfaces` is the energy of the attraction, 0 at large gaps and
+    negative at small ones. `lost` is the energy lost in snaps. `error` is the error of these energies: the differences
+    between work and energies in all steps without a snap, and the error of the dissipated energy by the mesh.
     """
 
     work: float = 0.0
@@ -110,7 +111,7 @@ NO_ENERGIES = AdhesiveEnergies()
 
 
 def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
-    """Return the energies after a step, in a box with an `area` [m^2]."""
+    """Return the energies after a step. `past` are those before it, and `area` [m^2] is the area of the box."""
     numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
     surfaces = numbers["surface_energy"]
     gained = instant.gained + surfaces - past.surfaces
@@ -140,8 +141,9 @@ def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[
 
 @dataclass(frozen=True)
 class AdhesionMemory:
-    """Memory of the columns: the energies, the number of steps in which the contact `snaps`, whether the warning about
-    fast fronts was given, and the values of the columns."""
+    """Memory of the effect: the energies, the number `snaps` of steps in which the contact has snapped, and the values
+    of the `columns` in the last row. `front_warning_given` is True after the warning about edges of contact that move
+    too far in a step."""
 
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
@@ -157,8 +159,8 @@ WARN_RANGE_FOLLOWS_CELLS = Kind(
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
-    """Columns of adhesion: share of the area under tension, force of all tension [N], energy of the surfaces [J], and
-    energy lost in snaps [J]."""
+    """Effect of adhesion: its contact law, its energies, and its columns. These are the share of the area under
+    tension, the force of all tension [N], the energy of the surfaces [J], and the energy lost in snaps [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
@@ -252,8 +254,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return AdhesionMemory()
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
-        """Return the energies after a step. No errors are stated across a snap. A warning is given for the first step
-        in which edges of contact of a viscoelastic body move too far."""
+        """Return the changes after a step: the energies and the columns. No errors are stated across a snap. The remark
+        warns of the first step in which the edges of contact of a viscoelastic body move too far."""
         solved, energies = instant.solved, memory.energies
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:

@@ -68,7 +68,8 @@ POWERS = 2.0 ** -np.arange(FARTHEST / LOG_TWO + 2.0)
 
 
 class Law(NamedTuple):
-    """Law of attraction in the units of a solve. Only the kind DUGDALE has a ramp."""
+    """Law of attraction in the units of a solve: its kind (EXPONENTIAL or DUGDALE), strength, range and ramp. Only the
+    kind DUGDALE has a ramp."""
 
     kind: int
     strength: float
@@ -77,7 +78,7 @@ class Law(NamedTuple):
 
     @staticmethod
     def touches(gap: Array) -> Mask:
-        """Return a map that is True where the gap is 0: surfaces touch there under pressure or tension."""
+        """Return a map that is True where the gap is 0: there the surfaces touch, under pressure or tension."""
         return gap == 0.0
 
 
@@ -103,7 +104,7 @@ def attraction(law, g):
 
 @loop
 def energy(law, g, sigma):
-    """Return gamma(g), the energy per area needed to open the gap from g to infinity; sigma is the attraction at g."""
+    """Return gamma(g): the energy per area that opens the gap from g to infinity. `sigma` is the attraction at g."""
     if law.kind == EXPONENTIAL:
         return law.range * sigma
     end = law.range + 0.5 * law.ramp
@@ -131,7 +132,7 @@ def attract(law, g, sigma):
 
 @loop
 def press(g, q, sigma, step, image):
-    """Add `step image` to the pressure q. Return the number of open points and their sum of `q + sigma`."""
+    """Add `step image` to the pressure q. Return the number of open points, and the sum of `q + sigma` over them."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -198,8 +199,8 @@ def certificate_sums(working, g, h, q, mean, sigma, z):
 
 @loop
 def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
-    """Return the sums over the working set of z, t, c z, e z and c t, with `c = q + mean + sigma` and its change in the
-    last step, `e = step image + sigma - sigma_old + shift`."""
+    """Return the sums of z, t, c z, e z and c t over the working set. c is the residual `q + mean + sigma`, and e its
+    change in the last step, `step image + sigma - sigma_old + shift`."""
     sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_c_z, row_e_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -222,8 +223,8 @@ def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
 
 @loop
 def lead(g, t, step, way):
-    """Put the change of the gap `max(g - step t, 0) - g` into `way`. Return the sum of the gaps after it, and by how
-    much the limit 0 has raised this sum."""
+    """Put the change of the gap, `max(g - step t, 0) - g`, into the map `way`. Return the sum of all gaps after this
+    change, and the amount by which the limit 0 has raised this sum."""
     total, cut = 0.0, 0.0
     for j in range(t.shape[0]):
         row_total, row_cut = 0.0, 0.0
@@ -240,8 +241,8 @@ def lead(g, t, step, way):
 
 @loop
 def curvature(law, g, q, mean, sigma, way, image):
-    """Return the sums of `-c w`, `w K w`, `w^2 (-d sigma/dg)` and w, and the largest -w/g, for the change w of the gap
-    (`way`) with the image K w (`image`)."""
+    """Return the sums of `-c w`, `w K w`, `w^2 (-d sigma/dg)` and w, and the largest -w/g. w is the change of the gap
+    in the map `way`, K w is in the map `image`, and c is the residual `q + mean + sigma`."""
     slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
     fastest, most = np.empty(g.shape[1]), 0.0
     for i in range(fastest.size):
@@ -266,9 +267,11 @@ def curvature(law, g, q, mean, sigma, way, image):
 
 @loop
 def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
-    """Put `g + step way`, at least 0, into `g_new`, and the attraction there into `sigma_new`. Return the change of
-    energy, the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d = g_new - g`, and the sum of the
-    terms' magnitudes. For short ways the change of gamma is d times the mean attraction, which rounds less."""
+    """Put `g + step way`, at least 0, into the map `g_new`, and the attraction at this gap into `sigma_new`.
+
+    Return the change of the energy, which is the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d
+    = g_new - g`, and the sum of the magnitudes of both parts. For small d the change of gamma is computed as d times
+    the mean attraction, which has a smaller rounding error."""
     total, size = 0.0, 0.0
     for j in range(g.shape[0]):
         row_total, row_size = 0.0, 0.0
@@ -308,10 +311,11 @@ LEAST_TRACTION = 1e-3  # load below which errors are not scaled by it, over the 
 
 
 class GapOperators(NamedTuple):
-    """Operator of a body and its inverse K, which is 0 for mean values.
+    """The operator A of a body, and its `inverse` K on fields of mean 0. K of a uniform field is 0.
 
-    `mean` is the displacement per unit of uniform pressure, 0 if the mean does not move; `least_mean` is a positive
-    compliance for mean values. Both are infinite if K also inverts mean values.
+    `mean` is the displacement under a uniform pressure of 1, 0 if a uniform pressure does not move the surface;
+    `least_mean` is a positive number in its place where one is needed. Both are infinite if K is the inverse of A on
+    all fields.
     """
 
     operator: Operator
@@ -330,10 +334,11 @@ class GapProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class GapSolution:
-    """A solved gap (in the map of the start) and its pressure (in a map of the solver, valid until the next solve).
+    """The solved `gap`, in the map of the start, and its pressure p, in a map of the solver that is valid until the
+    next solve. d is the approach.
 
-    `failure` is empty, or states why the solve failed. `detached`: no equilibrium exists under the load. `jumped`: the
-    solve went through unstable states.
+    `failure` is empty, or states why the solve failed. `detached` is True if no equilibrium exists under the load, and
+    `jumped` if the solve went through unstable states.
     """
 
     gap: Array
@@ -348,11 +353,12 @@ class GapSolution:
 
 @dataclass
 class GapIterate:
-    """Numbers of an iterate of the solver: mean and lowest gap, uniform part m of the pressure, and approach d.
+    """The input of a solve, and numbers of its present iterate: the mean and the lowest gap, the uniform part m of the
+    pressure, and the approach d.
 
-    `given` is the prescribed mean gap or None. The last step made a `share` of its change of the gap, which changes the
-    mean gap by `moved`, and m by `change`; `stable` is True for a Newton step. The next change is first tried with the
-    length `step`.
+    `given` is the prescribed mean gap, or None. The last iteration went a `share` of its way; the whole way changes the
+    mean gap by `moved`, and the iteration changed m by `change`. `stable` is True after a Newton step. `step` is the
+    alpha (see the module) with which the next way is tried first.
     """
 
     law: Law
@@ -398,8 +404,8 @@ class GapSolver:
     def solve(
         self, problem: GapProblem, gap: Array, tolerance: float, operators: GapOperators | None = None
     ) -> GapSolution:
-        """Solve from the map `gap`, which is overwritten by the solution; collective. `operators` replace the
-        solver's."""
+        """Solve from the gap in the map `gap`, which the solution overwrites; collective. `operators` are used in place
+        of the operators of the solver."""
         it = self._begin(problem, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, no_descent, jumped = (math.inf, 0), 0.0, 0, False, False

@@ -44,9 +44,10 @@ Values = NDArray[np.float64]
 
 
 class PullOff(NamedTuple):
-    """A pull-off. `row` is the row of the lowest load, `pressure` is the load and `between` its error by steps, as mean
-    pressures [Pa]. `lost` is the first row without contact: one after the last row if the run ended with the
-    detachment, None if the contact holds. `mesh` is the relative error by the mesh."""
+    """A pull-off. `row` is the row of the lowest load. `pressure` is the load of the pull-off, and `between` the error
+    of this load by the steps, both as mean pressures [Pa]. `lost` is the first row without contact: the number of rows
+    if the run ended with the detachment, None if the contact holds. `mesh` is the relative error of the load by the
+    mesh, NaN if unknown."""
 
     row: int
     pressure: float
@@ -111,8 +112,8 @@ def _below(steps: Values, loads: Values) -> float:
 
 
 def describe_pull_off(pulls: Sequence[PullOff], columns: Columns, area: float, tolerance: float) -> Iterator[str]:
-    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds. `area` is the area of the
-    box [m^2], `tolerance` the tolerance of the solves."""
+    """Yield a sentence for each of the `pulls` of a run with these columns; a contact that still holds has a largest
+    pull. `area` is the area of the box [m^2], `tolerance` the tolerance of the solves."""
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
         time, approach = (columns[name][pull.row] for name in ("time", "approach"))

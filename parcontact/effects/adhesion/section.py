@@ -99,7 +99,7 @@ class AdhesionLaw:
 
 
 def adhesion_law(section: Adhesion, grid: Grid, material: Any) -> AdhesionLaw:
-    """Return the law of a section; a range `auto` is the smallest that the cells resolve."""
+    """Return the law of a section, for a grid and a material; a range `auto` is the smallest that the cells resolve."""
     modulus = float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
     cell = max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)
     law = AdhesionLaw(section.work, math.nan, section.law, modulus, cell)
@@ -107,7 +107,7 @@ def adhesion_law(section: Adhesion, grid: Grid, material: Any) -> AdhesionLaw:
 
 
 def law_of(job: Any) -> AdhesionLaw:
-    """Return the law of a job that has the section."""
+    """Return the law of a job that has the section `adhesion`."""
     return adhesion_law(job.section("adhesion"), job.grid, job.material)
 
 
