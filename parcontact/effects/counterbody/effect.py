@@ -169,7 +169,7 @@ def _has_relaxed(job: Any) -> bool:
 
 
 class CounterbodyThatDeforms(Effect[None]):
-    """Effect of a counterbody that deforms."""
+    """Effect of a counterbody that deforms: the pair of both bodies replaces the material of the job."""
 
     section: ClassVar[type[Part]] = Counterbody
     in_curves: ClassVar[bool] = True

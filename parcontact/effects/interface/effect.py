@@ -55,7 +55,7 @@ def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
 def _sticks(
     interface: Any, grid: Any, initial: Any, steady: Any, bands: Any, history: Any, output: Any
 ) -> Iterator[Fault]:
-    """Refuse what stick is not solved for, and maps of tractions without stick."""
+    """Refuse jobs with stick that are not solved for, and maps of tractions without stick."""
     if interface is None or not interface.stick:
         yield from (fault for check in OF_TRACTIONS for fault in check(output))
         return
@@ -173,7 +173,8 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
 
 
 class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
-    """Columns of the two parts of friction, by the body and by the interface, whose sum is friction."""
+    """Effect of an interface without stick: its columns are the two parts of friction, by the body and by the
+    interface, which add up to the friction coefficient."""
 
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
 

@@ -1,4 +1,4 @@
-"""Stick and slip of the contact area: shear of a body before it slides, and while parts of the contact slide.
+"""Stick and slip of the contact area: a body is sheared before it slides, and while parts of its contact slide.
 
 The rigid surface moves by D along itself, the points of the body by u under tractions t that are bounded,
 
@@ -81,7 +81,7 @@ STICKING = Fit(
 
 
 class BoundedTraction(NamedTuple):
-    """Tractions `alpha traction`, two stacked components, and their bounds `alpha bound`."""
+    """Tractions, a map of two stacked components, and the map of their bounds, both divided by the modulus alpha."""
 
     traction: Array
     bound: Array
@@ -89,13 +89,14 @@ class BoundedTraction(NamedTuple):
 
 @dataclass(frozen=True)
 class StickMemory:
-    """Memory of stick and slip. Maps are in the run's units; all but bounds have two stacked components.
+    """Memory of stick and slip. Maps are in the run's units. They have two stacked components, except the bounds.
 
-    `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the modulus
-    `alpha`; `spare` receives the next tractions. `target` is the displacement at which points that stick end.
-    `strength` is the shear strength of the last step in which the surface moved [Pa]. `share` is the mean traction
-    divided by the mean bound. `energy` is the memory of the energies, None without energies; `lost` is the energy lost
-    in slip [J]. `columns` are the columns of the last row without `slip_loss`.
+    `body` is the memory of the displacements along the surface. `last` has the tractions of the last step and their
+    bounds, divided by its modulus `alpha`; the next ones are put into `spare`. `target` is the displacement that points
+    would have if they all stuck. `strength` is the shear strength [Pa] of the last step in which the surface moved.
+    `share` is the mean traction divided by the mean bound. `energy` is the memory of the energies, or None if the job
+    asks for none, and `lost` the energy lost in slip [J]. `columns` are the values of the columns in the last row,
+    except `slip_loss`.
     """
 
     body: BodyMemory
@@ -111,7 +112,8 @@ class StickMemory:
 
 
 class StickSlip(InterfaceEffect[StickMemory]):
-    """Effect of stick and slip: tractions of the contact, and the columns that follow from them."""
+    """Effect of stick and slip: it solves for the tractions of the contact, and adds the columns that follow from
+    them."""
 
     columns: ClassVar[tuple[str, ...]] = (*added_by("interface"), *added_by("interface.stick"))
     fields: ClassVar[tuple[str, ...]] = ("traction_x", "traction_y")
@@ -137,7 +139,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
 
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
-        """Return the tractions after a step, in the maps of `memory`; collective."""
+        """Return the changes after a step: the new tractions, in the maps of `memory`, and what follows from them;
+        collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
         (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
         way = along * x - across * y, along * y + across * x
@@ -238,12 +241,12 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return sheared, mean, round(stuck) / self._slab.points
 
     def values(self, memory: StickMemory) -> Sequence[float]:
-        """Return the two parts of friction, the share of the box that sticks, and the loss in slip [J], NaN without
-        energies."""
+        """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J]. The
+        latter is NaN if the job asks for no energies."""
         return *memory.columns, math.nan if memory.energy is None else memory.lost
 
     def field(self, memory: StickMemory, name: str) -> Array:
-        """Return this rank's rows of the traction on the body [Pa], one component."""
+        """Return this rank's rows of one component of the traction on the body [Pa]: `traction_x` or `traction_y`."""
         traction = components(memory.last.traction)[self.fields.index(name)]
         return traction * (memory.alpha * self._scene.units.pressure)
 
@@ -253,7 +256,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: StickMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries: the maps of both components, and the sums of energies."""
+        """Return the checkpoint entries. A map with two components has an entry for each of them."""
         pressure = units.height / units.length
         both = {
             "traction": Entry(memory.last.traction, pressure),

@@ -108,13 +108,15 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 
 @loop
 def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
-    """Divide points in contact into points that stick (marked in `free`) and points that slip.
+    """Divide the points in contact into points that stick, which are marked in `free`, and points that slip.
 
-    A point slips if its traction was shortened to its bound (`hit`), or `t + kappa w` exceeds the bound, and the slip
-    `w = e - u` is not opposite to t. `turn` receives |w|/f of points that slip, along t.
+    A point slips if its slip `w = e - u` is not opposite to its traction t, and if t was shortened to its bound (`hit`)
+    or `t + kappa w` exceeds its bound. The map `turn` gets |w|/f for points that slip, with the part of w along t and
+    the bound f.
 
-    Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound; of the components of `P(t + kappa w) - t`; of both components of w over points that stick, and their number.
+    Return eight sums. P(t) is the traction t shortened to its bound. The first three are the sums of |t|, |P(t + kappa
+    w)| and `|P(t + kappa w) - t|`, the next two those of the magnitudes of both components of `P(t + kappa w) - t`. The
+    last three are over the points that stick: of both components of w, and the number of these points.
     """
     size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     w_sticks_x, w_sticks_y, count = 0.0, 0.0, 0.0
@@ -152,10 +154,11 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
 
 @loop
 def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves, r):
-    """Put one component of the residual into r: for points that stick, the slip w; for others, the part of w across the
-    traction, times the root of `short/(short + turn)`.
+    """Put one component of the residual into the map r: the component along x if `along_x`, else along y.
 
-    A point `moves` along this component if it sticks, or if its traction is sufficiently across it; r is 0 elsewhere.
+    The residual of a point that sticks is its slip w. That of a point that slips is the part of w across its traction,
+    times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`: those that
+    stick, and those that slip whose traction is sufficiently across the axis. Elsewhere r is 0.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
@@ -175,12 +178,14 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
 def complete(
     bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, mean_x, mean_y, z_x, z_y
 ):
-    """Complete the direction z, which holds the preconditioned residual. Points that stick get a mean added. Points
-    that slip keep the part across the traction, times the root of `short/(short + turn)`, and get the rest of the
-    residual divided by `long + turn`.
+    """Complete the direction z from the preconditioned residual, which the maps of z hold.
 
-    With the residual r, the last change d of the tractions, and c = A d + turn d, all of them across the traction where
-    points slip, return the sums of r z, d r, z c and d c.
+    (mean_x, mean_y) is added to z at points that stick. At points that slip the part of z across the traction is
+    multiplied by the root of `share = short/(short + turn)`, and `(1 - share)/(long + turn)` times the slip across the
+    traction is added to it.
+
+    Return the sums of r z, r d, z c and d c, with the residual r (the slip), the last change d of the tractions, and
+    `c = A d + turn d`. At points that slip only the parts of r, d and c across the traction count.
     """
     r_z, r_d, z_c, d_c = 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
@@ -216,9 +221,12 @@ def complete(
 
 @loop
 def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
-    """Put the next tractions into (new_x, new_y), which hold the tractions before (x, y): `step z` and `again` times
-    the last change are added to (x, y). Tractions that slip keep the length of their bounds; other tractions are
-    shortened to their bounds. Return the sum of the changes."""
+    """Put the next tractions into the maps (new_x, new_y), which hold the tractions of the iteration before (x, y).
+
+    The next tractions are (x, y) plus `step` times z plus `again` times the last change. Then the tractions of points
+    that slip get the length of their bounds, and other tractions that are longer than their bounds are shortened to
+    them. Return the sum of the magnitudes of all changes.
+    """
     change = 0.0
     for j in range(bound.shape[0]):
         row_change = 0.0
@@ -244,8 +252,8 @@ def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
 
 @loop
 def change_since(bound, x, y, last_x, last_y, factor):
-    """Return the sum of |change of the tractions in contact| since the last step, whose tractions are multiplied by
-    `factor`, and the sum of the magnitudes of the last tractions."""
+    """Return the sum of the magnitudes of the changes of tractions since the last step, over points in contact, and the
+    sum of the magnitudes of the last tractions. The last tractions are `factor` times (last_x, last_y)."""
     change, size = 0.0, 0.0
     for j in range(bound.shape[0]):
         row_change, row_size = 0.0, 0.0
@@ -260,7 +268,8 @@ def change_since(bound, x, y, last_x, last_y, factor):
 
 @loop
 def slope_and_curvature(t, new_t, u, new_u, e):
-    """Return the sums of d w, d A d and |t w|, for the change d of the tractions, with the slip `w = e - u`."""
+    """Return the sums of d w, d A d and |t w|, with the change `d = new_t - t` of the tractions and the slip `w = e -
+    u`. u is A t, and `new_u` is A times the new tractions."""
     slope, curvature, size = 0.0, 0.0, 0.0
     for j in range(t.shape[0]):
         row_slope, row_curvature, row_size = 0.0, 0.0, 0.0
@@ -277,7 +286,8 @@ Vector = tuple[float, float]
 
 
 def stacked(slab: Slab) -> Slab:
-    """Return the slab of maps with two components: each rank holds rows of the first, then of the second component."""
+    """Return the slab of maps that stack two components: each rank has its rows of the first component, and then the
+    same rows of the second one."""
 
     def twice(rank: int) -> slice:
         rows = slab.rows_of(rank)
@@ -293,11 +303,11 @@ def components(field: Array) -> tuple[Array, Array]:
 
 
 class ShearOperator:
-    """Operator from tractions to displacements on a half space of shear modulus 1, loaded inside a box of `size` [any
-    unit of length].
+    """Operator from tractions to displacements along the surface of a half space of shear modulus 1, which is loaded
+    inside a box of a `size` in any unit of length.
 
-    The box is periodic unless `free`. `short` is the compliance of the shortest waves across their direction. The
-    constructor and `apply` are collective.
+    The box is periodic unless it is `free`. `short` is the displacement of the shortest waves of the grid under a
+    traction of 1 across their direction. The constructor and `apply` are collective.
     """
 
     def __init__(self, fft: FFT, size: Vector, poisson: float, free: bool) -> None:
@@ -324,7 +334,8 @@ class ShearOperator:
             symbol += 1.0 / q
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Put the displacements of stacked tractions into `out`; collective. A call counts as two operator calls."""
+        """Put the displacements under the tractions `field` into `out`, both with stacked components; collective. A
+        call counts as two operator calls."""
         self.fft.slab.tally["operator"] += 2
         (t_x, t_y), (u_x, u_y) = components(field), components(out)
         first: Spectrum = self._other
@@ -387,8 +398,9 @@ Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t 
 
 
 class TractionProblem(NamedTuple):
-    """Input of a solve: bounds f, stacked displacements e at which points that stick end (`aim`), a stiffness kappa of
-    the contact, in the unit of t divided by the unit of e, and the tolerance of the certificate."""
+    """Input of a solve: the map `bound` of the bounds f; the map `aim` of the displacements e at which points that
+    stick end, with stacked components; a stiffness `kappa` of the contact, in the unit of tractions divided by the unit
+    of displacements; and the `tolerance` of the certificate."""
 
     bound: Array
     aim: Array
@@ -398,8 +410,8 @@ class TractionProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class Tractions:
-    """Solved tractions, in the map of the start. `displacement = A t` belongs to the solver and is valid until the next
-    solve. `failure` is empty, or states why the tolerance was not reached."""
+    """Result of a solve, whose tractions t are in the map of the start. The map `displacement` has A t; it belongs to
+    the solver and is valid until the next solve. `failure` is empty, or states why the tolerance was not reached."""
 
     displacement: Array
     certificate: float
@@ -408,7 +420,8 @@ class Tractions:
 
 
 class TangentialSolver:
-    """Solver of tractions on one grid: `operator` for stacked tractions, `preconditioner` for one component."""
+    """Solver of tractions on one grid. `operator` takes both stacked components of tractions to displacements, and
+    `preconditioner` takes one component of displacements to tractions. `limit` is the largest number of iterations."""
 
     def __init__(self, slab: Slab, operator: ShearOperator, preconditioner: Operator, grids: Grids, limit: int) -> None:
         self.slab, self._limit = slab, limit
@@ -420,8 +433,8 @@ class TangentialSolver:
         self._free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
 
     def solve(self, problem: TractionProblem, t: Array, last: Array, factor: float = 1.0) -> Tractions:
-        """Solve from the tractions t, which are overwritten by the solution; collective. The tractions of the step
-        before are `factor` times `last`."""
+        """Solve from the tractions in the map t, which the solution overwrites; collective. `factor` times `last` are
+        the tractions of the step before."""
         bound, aim, kappa, asked = problem
         shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
