@@ -1,6 +1,6 @@
-"""Suggestions of settings and warnings about settings that are probably not meant: mesh, box and time steps.
+"""Warnings about the mesh, the box and the time steps of a job, and the mesh that an accuracy needs.
 
-Meshes need a number of cells per shortest wave of the surface, along and across the sliding direction.
+A mesh needs enough cells per shortest wave of the surface, along and across the sliding direction.
 
 The mesh causes two kinds of errors of friction and contact area, both at edges of contact. Systematic errors grow with
 the phase of the modulus, because the pressure at one edge of a spot is steeper than at the other. Random errors come

@@ -36,7 +36,7 @@ def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
 
 
 def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
-    """Yield an error about `what` in a box that is free along y only, for which no kernel exists."""
+    """Yield an error for a box that is free along y only: `what`, such as steady sliding, has no kernel for it."""
     if any(grid.cyclic) and not all(grid.cyclic):
         yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
@@ -85,8 +85,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
 
 
 def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
-    """Yield an error unless a surface in bands has a spectrum, after one measured map at most, and no maps are
-    saved."""
+    """Yield errors for bands of a surface without a spectrum, and for outputs that bands do not have. Before the shapes
+    with spectra there may be one measured map."""
     if bands is None:
         return
     for index, shape in enumerate(surface):
@@ -222,7 +222,8 @@ def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Yield an error unless arrays have the shape of the grid, and coordinates, if any, its cells."""
+    """Yield errors for arrays of heights without the shape of the grid, and for coordinates that are not spaced as its
+    cells."""
     for index, shape in enumerate(surface):
         if not isinstance(shape, HeightArray):
             continue
@@ -263,7 +264,8 @@ def loads_are_borne(
 
 
 def refuse_steady(section: str) -> Rule:
-    """Return the rule that excludes steady sliding with a section whose effect has its own contact law."""
+    """Return the rule that a job with the `section` cannot ask for steady sliding, as the effect of this section has a
+    contact law of its own."""
 
     def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
         for key in steady_sections(initial, steady) if given is not None else ():
@@ -274,7 +276,7 @@ def refuse_steady(section: str) -> Rule:
 
 
 def refuse_bands_over_time(section: str) -> Rule:
-    """Return the rule that excludes bands with a history for a section whose effect does not work in such bands."""
+    """Return the rule that a job with the `section` cannot march bands through a history."""
 
     def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         if given is not None and bands is not None and history:

@@ -34,7 +34,8 @@ MOST_BRANCHES = 6  # largest number of branches that a table shows; of more it s
 
 
 def plain_data(value: Any) -> Any:
-    """Return a value of a job as plain data, without keys that have no value or that the accuracy chose."""
+    """Return a value of a job as plain data: numbers, texts, lists and mappings. Keys without a value, and keys that
+    `numerics.accuracy` chose, are left out."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
@@ -54,7 +55,8 @@ def plain_data(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """Yield the keys of a part that have a value, with their values, where parts are as the job gives them."""
+    """Yield the keys of a part that have a value, with these values. A value that is a part itself is returned as the
+    job gives it (`Part.given`)."""
     names = (name for name in type(part).model_fields if name not in part.left_out())
     for name in names:
         if (value := getattr(part, name)) is not None:
@@ -135,7 +137,7 @@ def listed_line(part: Part) -> str:
 
 
 def text(value: Any) -> str:
-    """Return a value as text, numbers in six digits."""
+    """Return a value as text, with numbers in six digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

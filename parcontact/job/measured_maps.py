@@ -1,6 +1,6 @@
-"""Measured maps as heights of a box on a grid, and measured spectra.
+"""Measured maps that are prepared for the box and the grid of a job, and measured spectra.
 
-A measured map is read, cut to the box, treated (levelled, filled, made periodic), and resampled.
+A map is read, cut to the box, treated (levelled, filled, made periodic), and resampled to the grid.
 
 Maps have the shape (ny, nx); missing points are NaN.
 
@@ -70,8 +70,11 @@ def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Arra
 
 
 def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
-    """Return a map whose missing points are filled by a harmonic surface through the known points around them, relaxed
-    from the nearest known height in about n^2 sweeps for a hole n points wide."""
+    """Return a map whose missing points are filled by a harmonic surface through the known points around them.
+
+    The surface is found by relaxation, which begins with the nearest known heights and takes about n^2 sweeps for a
+    hole n points wide.
+    """
     if known.all():
         return heights
     depth, nearest = scipy.ndimage.distance_transform_edt(~known, return_indices=True)

@@ -3,7 +3,7 @@
 Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
 The size of a text and the number of its values after expansion of aliases are limited.
 
-Mistakes are predicates of sentences about a key, which pydantic collects.
+A mistake is stated as the predicate of a sentence about a key (`Fault`); pydantic collects these.
 
 For jobs given as Python data instead of a file, messages about mistakes name the key.
 """

@@ -29,11 +29,11 @@ LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors", Density: "densit
 
 @dataclass(frozen=True)
 class Compound:
-    """A measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference temperature,
-    and the `shift` (None for a table of one temperature).
+    """A fitted compound: the measurement `measured`, the Prony series `series` at the reference temperature, and the
+    `shift` with temperature, None for a table of one temperature.
 
-    `poisson` converts Young's moduli; `weigh` names the modulus that is fitted, or both; `found` is the
-    superposition of the sweeps, None if the shift is given.
+    `poisson` is the Poisson ratio, by which Young's moduli become shear moduli. `weigh` names the fitted moduli:
+    storage, loss or both. `found` is the result of the superposition of the sweeps, None if the shift was given.
     """
 
     measured: Any
@@ -198,9 +198,10 @@ def fitted(
 ) -> Compound:
     """Return the compound fitted to a table of measured moduli.
 
-    `law` is wlf, arrhenius or free (constants are fitted, too), or a known shift; `vertical` is the law of b_T, unless
-    the known shift has one; `reference` [deg C] is by default the middle of the measured temperatures. Raises
-    InputError, also for a table that no fit meets.
+    `law` is the name of a shift law whose constants are fitted, wlf, arrhenius or free, or a shift with known
+    constants. `vertical` is the law of b_T (`series.superpose`) for a shift without one. `reference` [deg C] is the
+    reference temperature, by default the middle one of the measured temperatures. `error` is the accepted relative
+    error of both moduli. Raises InputError for a table that cannot be read, and for one that no series fits.
     """
     from . import moduli, series
     from .series import log_factors, superpose

@@ -1,4 +1,4 @@
-"""Tables of measured moduli, converted to SI units, or refused in one sentence with file and line.
+"""Reading of tables of measured moduli, which are converted to SI units, or refused with file and line.
 
 Headers, units and numbers are read by `text_tables`: two header rows, as in pyvisco's files, or units in brackets or
 behind a slash. The columns are:
@@ -8,12 +8,13 @@ behind a slash. The columns are:
 * `tan_del`; |E*| and |G*|, absolute values, and delta, the phase angle (deg, rad);
 * D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
-A modulus named by words alone is taken as Young's modulus. If rates are in rad/s, as from rheometers, it is taken as
-the shear modulus, with a warning; the same holds for a compliance. Missing moduli follow from tan delta or the phase
-angle. Columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set, and
-rows of one frequency at many temperatures are one set each.
+A modulus that is named by words alone is taken as Young's modulus, but as the shear modulus if rates are in rad/s, as
+rheometers write them. A compliance that is named by words alone is taken as one of shear. The shear modulus and the
+compliance get a warning. Missing moduli follow from tan delta or the phase angle. Columns with other names are ignored.
+Rows of one temperature form a set. Without a column T all rows form one set. In a table of one frequency and many
+temperatures each row is a set.
 
-Checks refuse tables that cannot be of a measured rubber, and wrong units, before a fit.
+Tables with values that no rubber has, such as moduli in a wrong unit, are refused before a fit.
 """
 
 import math
@@ -76,11 +77,11 @@ def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
 
 
 def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
-    """Return the rms scatter of the logarithms of moduli: the deviation of a point from the curve through its two
-    neighbours on either side.
+    """Return the scatter of moduli: the rms deviation of their logarithms from curves through the two neighbouring
+    points on either side.
 
-    `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan if all sweeps have less than five points.
-    The interpolation is cubic in the logarithms, so that smooth curves have no scatter. Deviations are divided by the
+    Each of the `sweeps` has rates and moduli, both of shape (n,), in the order of rising rates. The result is NaN if no
+    sweep has five points. The interpolation is cubic in the logarithms, so that smooth curves have no scatter. Deviations are divided by the
     root of 1 + the sum of squared interpolation weights, as for independent errors.
     """
     found = []
@@ -114,7 +115,7 @@ EXAMPLE = "f[Hz] E'[MPa] E''[MPa]"
 class Set:
     """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
 
-    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of relaxation or creep. `storage` and
+    `at`, shape (n,), are angular frequencies [rad/s] of a frequency sweep, or times [s] of relaxation or creep. `storage` and
     `loss`, shape (n,) [Pa], are shear moduli. For relaxation `storage` is the relaxation modulus, for creep the inverse
     compliance, and `loss` is empty.
     """
@@ -127,7 +128,7 @@ class Set:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All sets of a file, by temperature; `tension` is True if Young's moduli were converted.
+    """All sets of a file in the order of their temperatures; `tension` is True if Young's moduli were converted.
 
     `derived` is the modulus computed from the other modulus and tan delta: "stor", "loss", or "" for none. `doubts` are
     sentences about ambiguities and omissions.

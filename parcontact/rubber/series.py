@@ -1,6 +1,6 @@
-"""Fits to measured moduli: Prony series, and shifts in time and modulus.
+"""Fits of Prony series, and of shifts with temperature, to measured moduli.
 
-A Prony series is fitted to measured moduli, with as many branches as the loss modulus needs:
+A Prony series has as many branches as the loss modulus needs:
 
     G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
     J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
@@ -19,8 +19,8 @@ In time-temperature superposition of measured sets, horizontal factors a_T and v
 
 Rates are reduced by a_T and moduli divided by b_T, so that one series describes all sets. The constants of both laws
 minimize the squared misfit of the best series (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10
-(1973) 413). Without b_T, a consequence of the entropy of rubber (J. D. Ferry, Viscoelastic Properties of Polymers
-(1980), chapter 11), constants of a_T have errors of a tenth and more.
+(1973) 413). Factors b_T follow from the entropy of rubber (J. D. Ferry, Viscoelastic Properties of Polymers (1980),
+chapter 11). If they were left out, the constants of a_T would have errors of a tenth and more.
 """
 
 import itertools
@@ -62,11 +62,11 @@ Errors = tuple[float, float, float]
 class PronySeries:
     """A fitted Prony series: `modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference.
 
-    `error` is the rms relative misfit of the fitted data; `best` the smallest misfit of any series; `alone` the
-    smallest misfits if only storage or only loss is fitted; `scatter` the relative scatter of data in a sweep about a
-    smooth curve, nan if sweeps are too short. `band` [rad/s] is the range of frequencies in which moduli are known, and
-    `loss_errors` are the relative errors (two standard deviations) of the loss modulus inside this range, at its lower
-    and at its upper end.
+    `error` is the rms relative misfit of the fitted data, and `best` the smallest one of any series. `alone` are the
+    smallest misfits if only the storage modulus, or only the loss modulus, is fitted. `scatter` is the relative scatter
+    of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the range of frequencies
+    in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of the loss modulus
+    inside this range, at its lower end and at its upper end.
     """
 
     modulus_inf: float
@@ -104,10 +104,10 @@ class PronySeries:
 
 
 def kernel(at: Array, kind: Kind, times: Array) -> Array:
-    """Return the contribution of each unit weight to each value of the data, shape (data, weights).
+    """Return the data that each term of a spectrum gives if its weight is 1, shape (number of data, number of weights).
 
-    Weights of the times come first, then the weight of the spring, or for creep the weights of the instantaneous
-    compliance and of the fluidity.
+    Terms with the relaxation or retardation `times` come first, then the spring, or for creep the instantaneous
+    compliance and the fluidity. Data are those of `ReducedData` for a `kind` of measurement; data of creep are J.
     """
     if kind == "frequency":
         found = complex_kernel(at, kind, times)
@@ -118,7 +118,8 @@ def kernel(at: Array, kind: Kind, times: Array) -> Array:
 
 
 def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
-    """Return the contribution of each unit weight to G* at angular frequencies [rad/s]; to J* for creep."""
+    """Return G*, or J* for creep, of each term of a spectrum with the weight 1, shape (n, number of weights), at angular
+    frequencies `omega` [rad/s], shape (n,); the order of the terms is as in `kernel`."""
     z, one = 1j * omega[:, None] * times, np.ones((omega.size, 1))
     if kind == "creep":
         return np.hstack([1.0 / (1.0 + z), one, 1.0 / (1j * omega[:, None])])
@@ -154,7 +155,8 @@ class ReducedData:
         return (low, high) if self.kind == "frequency" else (low, 2 * math.pi / EARLIEST * high)
 
     def columns(self, times: Array) -> Array:
-        """Return the contribution of each unit weight to the fitted data, divided by these; data of creep are J."""
+        """Return the `kernel` of the fitted data, divided by these data: the weights of an exact fit give 1 for each of
+        them. Data of creep are J."""
         found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
         return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
 
@@ -164,7 +166,8 @@ class ReducedData:
         return float(np.sqrt(np.mean(np.log(ratio) ** 2)))
 
     def find_spring(self, storage: Array) -> float:
-        """Return the mean excess [Pa] of measured storage moduli over `storage` of a spectrum without a spring."""
+        """Return the modulus [Pa] of a spring that leaves no mean relative deviation from the measured storage moduli
+        if it is added to the storage moduli `storage` [Pa] of a spectrum; at least 0."""
         measured = self.moduli[: self.at.size]
         return max(0.0, float(np.mean(1.0 - storage / measured) / np.mean(1.0 / measured)))
 
@@ -187,7 +190,8 @@ def reduce_sets(
 
 
 def best_residuals(data: ReducedData, per_decade: int = DENSE) -> Array:
-    """Return the residuals of the fitted data for the best series of any number of branches, relative to the data."""
+    """Return the relative residuals of the fitted data for the best series of any number of branches, with `per_decade`
+    possible times per decade."""
     low, high = data.rates
     first, last = (round(per_decade * (math.log10(1.0 / rate) + side)) for rate, side in ((high, -SPARE), (low, SPARE)))
     columns = data.columns(np.power(10.0, np.arange(first, last + 1) / per_decade))
@@ -287,9 +291,9 @@ def _scale(times: Array, weights: Array, inside: slice) -> Array:
 def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> PronySeries:
     """Return the shortest series that fits the data as closely as the smooth spectrum does.
 
-    At all rates of the data the moduli of the series differ from the spectrum's by at most `error`, plus the standard
-    deviation of the loss modulus if it is smaller. The series has at least one branch per decade. `sweeps` are rates
-    and moduli, from which the scatter is computed.
+    At all rates of the data the relative differences between the moduli of the series and of the spectrum are at most
+    hypot(`error`, d), where d is the relative standard deviation of the loss modulus, or `error` if this is smaller.
+    The series has at least one branch per decade. `sweeps` are the rates and moduli from which the scatter is computed.
     """
     spectrum, (low, high), (slow, fast) = Spectrum.fit(data), data.band, data.rates
     decades = math.log10(fast / slow)

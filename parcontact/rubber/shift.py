@@ -92,7 +92,8 @@ class Arrhenius:
 
 @dataclass(frozen=True)
 class Factors:
-    """Shift by a table: log10 of a_T at rising temperatures [deg C]; 0 at the reference temperature."""
+    """Factors by a table: `logs` are log10 of a_T, or of b_T, at rising `temperatures` [deg C]; they are taken relative
+    to the factor at the `reference` temperature [deg C]."""
 
     temperatures: tuple[float, ...]
     logs: tuple[float, ...]
