@@ -81,8 +81,8 @@ def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
     points on either side.
 
     Each of the `sweeps` has rates and moduli, both of shape (n,), in the order of rising rates. The result is NaN if no
-    sweep has five points. The interpolation is cubic in the logarithms, so that smooth curves have no scatter. Deviations are divided by the
-    root of 1 + the sum of squared interpolation weights, as for independent errors.
+    sweep has five points. The interpolation is cubic in the logarithms, so that smooth curves have no scatter.
+    Deviations are divided by the root of 1 + the sum of squared interpolation weights, as for independent errors.
     """
     found = []
     for rates, moduli in sweeps:
@@ -115,9 +115,9 @@ EXAMPLE = "f[Hz] E'[MPa] E''[MPa]"
 class Set:
     """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
 
-    `at`, shape (n,), are angular frequencies [rad/s] of a frequency sweep, or times [s] of relaxation or creep. `storage` and
-    `loss`, shape (n,) [Pa], are shear moduli. For relaxation `storage` is the relaxation modulus, for creep the inverse
-    compliance, and `loss` is empty.
+    `at`, shape (n,), are angular frequencies [rad/s] of a frequency sweep, or times [s] of relaxation or creep.
+    `storage` and `loss`, shape (n,) [Pa], are shear moduli. For relaxation `storage` is the relaxation modulus, for
+    creep the inverse compliance, and `loss` is empty.
     """
 
     temperature: float | None

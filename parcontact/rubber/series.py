@@ -118,8 +118,10 @@ def kernel(at: Array, kind: Kind, times: Array) -> Array:
 
 
 def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
-    """Return G*, or J* for creep, of each term of a spectrum with the weight 1, shape (n, number of weights), at angular
-    frequencies `omega` [rad/s], shape (n,); the order of the terms is as in `kernel`."""
+    """Return G*, or J* for creep, of each term of a spectrum with the weight 1 at angular frequencies `omega` [rad/s].
+
+    `omega` has the shape (n,), the result (n, number of weights), with the terms in the order of `kernel`.
+    """
     z, one = 1j * omega[:, None] * times, np.ones((omega.size, 1))
     if kind == "creep":
         return np.hstack([1.0 / (1.0 + z), one, 1.0 / (1j * omega[:, None])])
