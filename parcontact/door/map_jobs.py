@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import files, hdf5
+from ..files import files
 from ..job import Job, yaml_text
 from ..job.listing import plain_data
 from ..march import mesh
@@ -60,11 +60,8 @@ def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     if target is None:
         yield f"\na job to start from (--job FILE writes it to a file):\n\n{text.rstrip()}"
         return
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
+    with files.writing(target):
         files.replace_file(target, text)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
     yield f"job: {target}"
 
 

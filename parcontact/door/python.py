@@ -35,7 +35,7 @@ from ..job import Job, log_range
 from ..job.history import Timeline
 from ..march import curve, mesh, sanity
 from ..march.point import Point
-from ..march.scene import Setup, set_up
+from ..march.scene import set_up
 from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
@@ -170,13 +170,6 @@ def of_parts(**parts: Any) -> Job:
     """Return a job from some sections, made on this rank only. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
     return _sound(mesh.load(rest | parts))
-
-
-def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
-    """Warn on root about implausible values, also at `temperatures` [deg C]; collective."""
-    for doubt in sanity.find_doubts(setup, temperatures):
-        if setup.slab.root:
-            warn(doubt)
 
 
 def warn(doubt: Doubt) -> None:

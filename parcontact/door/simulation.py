@@ -25,7 +25,7 @@ from ..files.stopping import Options
 from ..job import Job
 from ..job.listing import plain_job
 from ..job.yaml_text import parse
-from ..march import steady
+from ..march import sanity, steady
 from ..march.choices import choices
 from ..march.loop import March
 from ..march.sanity import ContactWatch
@@ -33,7 +33,7 @@ from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from .python import Given, agree, all_ranks, path_of, python_words, read_job_here, warn, warn_of
+from .python import Given, agree, all_ranks, path_of, python_words, read_job_here, warn
 
 
 class Row(Mapping[str, float]):
@@ -313,7 +313,8 @@ class Simulation:
             wisdom.recall(choices(self.job).transforms, self._slab, saved.numbers.get("plans/all") if saved else None)
             with python_words():
                 self._march_made = steady.first(self.job, self._slab, saved=saved)
-            warn_of(self._march_made.scene.setup)
+            for doubt in sanity.find_doubts(self._march_made.scene.setup):
+                self._warns(doubt)
         return self._march_made
 
     @cached_property

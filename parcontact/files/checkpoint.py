@@ -144,7 +144,7 @@ def inspect(path: Path) -> Contents:
         with h5py.File(path, "r") as file:
             return _contents(path, file)
     except hdf5.FAILURES as error:
-        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
+        raise InputError(f"{path} cannot be read: {files.reason(error)}") from error
 
 
 def is_one(path: Path) -> bool:

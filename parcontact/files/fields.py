@@ -247,7 +247,7 @@ class FieldsFile(GrowingMaps):
                 files.replace_file(target, xdmf(self.path.name, times, steps, points, self.size, self.names))
                 self.trouble = ""
             except hdf5.FAILURES as error:
-                self.trouble = f"cannot write {target}: {hdf5.reason(error)}"
+                self.trouble = f"cannot write {target}: {files.reason(error)}"
         self._drawn = clock.monotonic()
 
 
@@ -280,7 +280,7 @@ def _found(path: Path, slab: Slab) -> tuple[SavedMaps | None, str]:
             raise InputError(f"{path} is locked by another program; let it close the file, and run again") from None
         except hdf5.FAILURES as error:
             kept = files.put_aside(path)
-            return None, f"{path} cannot be read ({hdf5.reason(error)}): it is kept as {kept}, and a new file is begun"
+            return None, f"{path} cannot be read ({files.reason(error)}): it is kept as {kept}, and a new file is begun"
 
     return on_root(slab.comm, look)
 

@@ -15,6 +15,7 @@ from typing import BinaryIO
 from ..errors import InputError
 
 PLACES = ("*", "checkpoint/*", "cases/*/*", "cases/*/checkpoint/*")  # of files in an output directory
+TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 MARK = "made by the program parcontact"  # mark in the metadata of pages and pictures
 
 
@@ -65,6 +66,40 @@ def refuse_pipes(path: Path) -> None:
         with suppress(OSError):
             if (mode := one.stat().st_mode) and (stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
                 raise InputError(f"{one} is a device or a pipe, which is not read: move it away")
+
+
+def reason(error: BaseException) -> str:
+    """Return the reason of a failure in a few words, without HDF5's stack of calls."""
+    text = str(error)
+    if found := re.search(r"error message = '([^']+)'", text):
+        return found.group(1)
+    if found := re.search(r"truncated file: eof = (\d+), sblock->base_addr = (\d+), stored_eof = (\d+)", text):
+        return f"it is incomplete: it has {int(found[1]) + int(found[2])} of {found[3]} bytes"
+    if "file signature not found" in text:
+        return "it is not an HDF5 file, or incomplete"
+    if isinstance(error, OSError) and error.strerror and error.errno:
+        return (
+            TOO_LARGE if error.errno == errno.EFBIG else error.strerror if error.filename else os.strerror(error.errno)
+        )
+    return text.splitlines()[0] if text else type(error).__name__
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Create the directory of a file that is written within the context; raises InputError if one of them fails."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {reason(error)}") from error
+
+
+def write_own(path: Path, text: str) -> None:
+    """Write a text to a file, which is replaced if it begins with the same line; another file of this name is renamed,
+    with a warning. Raises InputError."""
+    first = text.partition("\n")[0].encode()
+    with writing(path), replaced(path, lambda there: there.read_bytes().startswith(first)) as file:
+        file.write(text.encode())
 
 
 def replace_file(path: Path, text: str) -> None:

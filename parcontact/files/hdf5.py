@@ -6,7 +6,6 @@ not change the structure, so a killed run leaves a readable file. An error on on
 
 import errno
 import os
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -19,7 +18,7 @@ from ..errors import InputError, RunError
 from ..parallel import root
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
-from .files import without_mark
+from .files import reason, without_mark
 
 T = TypeVar("T")
 MPI_IO = h5py.get_config().mpi  # else ranks act in turn
@@ -32,7 +31,6 @@ FAILURES = (
     MemoryError,
     OverflowError,
 )  # errors that h5py raises for damaged files
-TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 MEND = "restore the whole file, or move it away to continue without its maps"
 FULL = 1 << 16  # tuning: free space below which a failure of MPI-IO means a full disk [bytes]
 DOUBLE = 8  # size of a number in a map [bytes]
@@ -112,22 +110,6 @@ def raise_first(slab: Slab, problem: str) -> None:
     """Raise RunError on all ranks with the `problem` of the first rank that has one ('' for none); collective."""
     if problem := next((text for text in slab.from_all(problem) if text), ""):
         raise RunError(problem)
-
-
-def reason(error: BaseException) -> str:
-    """Return the reason of a failure in a few words, without HDF5's stack of calls."""
-    text = str(error)
-    if found := re.search(r"error message = '([^']+)'", text):
-        return found.group(1)
-    if found := re.search(r"truncated file: eof = (\d+), sblock->base_addr = (\d+), stored_eof = (\d+)", text):
-        return f"it is incomplete: it has {int(found[1]) + int(found[2])} of {found[3]} bytes"
-    if "file signature not found" in text:
-        return "it is not an HDF5 file, or incomplete"
-    if isinstance(error, OSError) and error.strerror and error.errno:
-        return (
-            TOO_LARGE if error.errno == errno.EFBIG else error.strerror if error.filename else os.strerror(error.errno)
-        )
-    return text.splitlines()[0] if text else type(error).__name__
 
 
 def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:

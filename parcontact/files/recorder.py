@@ -353,7 +353,7 @@ class Recorder:
         try:
             yield
         except OSError as error:
-            self.problem = self.problem or f"cannot write {self.path / outputs.RUN.table}: {hdf5.reason(error)}"
+            self.problem = self.problem or f"cannot write {self.path / outputs.RUN.table}: {files.reason(error)}"
         except RunError as error:
             self.problem = self.problem or str(error)
 

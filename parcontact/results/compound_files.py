@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..files import files, hdf5, outputs
+from ..files import files, outputs
 from ..parallel.slab import Array
 from ..rubber.compound import TITLE, Compound
 from ..rubber.series import log_factors, reduce_sets
@@ -48,7 +48,7 @@ def write_compound(compound: Compound, target: Path, job_band: tuple[float, floa
         draw_compound(compound, picture, job_band)
     except OSError as error:
         wrong = files.without_mark(Path(error.filename or target))
-        raise InputError(f"{wrong} cannot be written: {hdf5.reason(error)}") from error
+        raise InputError(f"{wrong} cannot be written: {files.reason(error)}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))
     yield f"material file: {target}, picture: {picture}"
     yield from (f"warning: {text}" for text in compound.doubts())

@@ -7,7 +7,6 @@ frequencies or temperatures there. Effects export tables of runs.
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
 from ..doubts import Doubt
 from ..errors import InputError
-from ..files import files, hdf5, tables
+from ..files import files, tables
 from ..files.provenance import PROGRAM
 from ..files.tables import Wanted
 from ..job import load
@@ -53,19 +52,9 @@ def export_results(directory: Path, form: str, out: Path | None = None) -> Itera
     for table in found:
         path = out or directory / f"{table.name}{SUFFIX[form]}"
         text = to_csv(table.head, table.rows) if form == "csv" else _to_abaqus(table)
-        first = partial(_begins_with, text.partition("\n")[0].encode())
-        try:
-            with files.replaced(path, first) as file:
-                file.write(text.encode())
-        except OSError as error:
-            raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from error
+        files.write_own(path, text)
         yield f"{table.name}: {len(table.rows)} rows in {path}"
         yield from table.sentences
-
-
-def _begins_with(first: bytes, path: Path) -> bool:
-    """Return True if a file begins with a line, as a table of this program does; raises OSError."""
-    return path.read_bytes().startswith(first)
 
 
 def _friction(directory: Path) -> ExportedTable:

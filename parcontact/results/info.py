@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .. import capabilities
 from ..errors import InputError
-from ..files import checkpoint, fields, hdf5, outputs, tables
+from ..files import checkpoint, fields, files, hdf5, outputs, tables
 from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
 from ..job import Job, Stage, yaml_text
@@ -52,7 +52,7 @@ def describe_path(path: Path) -> tuple[str, bool]:
     except hdf5.FAILURES as error:
         if NOT_HDF5 in str(error):
             raise InputError(f"{path} is neither a checkpoint nor a field file: it is not an HDF5 file") from None
-        return f"{path} cannot be read: {hdf5.reason(error)}", False
+        return f"{path} cannot be read: {files.reason(error)}", False
     raise InputError(f"{path} is neither a checkpoint nor a field file")
 
 
@@ -122,7 +122,7 @@ def describe_files(directory: Path) -> tuple[str, bool]:
     try:
         claims = tables.read_claims(directory)
     except (OSError, ValueError) as error:
-        return f"{directory}: {hdf5.reason(error)}", False
+        return f"{directory}: {files.reason(error)}", False
     if not claims and not any((directory / name).exists() for name in (outputs.RUN.table, outputs.SWEEP.table)):
         raise InputError(
             f"{directory} has no results yet: neither a file .parcontact, nor measures.csv or sweep.csv; a run "
@@ -137,7 +137,7 @@ def describe_files(directory: Path) -> tuple[str, bool]:
         except InputError as error:
             problems.append(f"  {error}")
         except hdf5.FAILURES as error:
-            problems.append(f"  {directory}: {hdf5.reason(error)}")
+            problems.append(f"  {directory}: {files.reason(error)}")
     return "\n".join([*lines, *problems]), not problems
 
 

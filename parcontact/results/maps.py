@@ -380,7 +380,7 @@ def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Pat
     try:
         frames, rate = _draw(directory, name)
     except hdf5.FAILURES as error:
-        raise InputError(f"no movie from {directory / outputs.RUN.maps}: {hdf5.reason(error)}") from error
+        raise InputError(f"no movie from {directory / outputs.RUN.maps}: {files.reason(error)}") from error
     for target in targets:
         _write_gif(target, frames, rate) if target.suffix == ".gif" else _write_mp4(target, frames, rate)
     return targets

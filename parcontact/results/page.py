@@ -399,12 +399,8 @@ def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
             raise InputError(f"{directory} is not a directory")
         _refuse_links(directory)
     text = render(directories)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(target, files.is_marked) as file:
-            file.write(text.encode(errors="backslashreplace"))
-    except OSError as error:
-        raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
+    with files.writing(target), files.replaced(target, files.is_marked) as file:
+        file.write(text.encode(errors="backslashreplace"))
     return target
 
 

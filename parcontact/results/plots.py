@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from .. import printed
 from ..errors import InputError
-from ..files import hdf5, outputs
+from ..files import files, outputs
 from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
 from . import band_charts, info, maps, plotted_run, style
@@ -104,7 +104,7 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
     try:
         return style.save_figure(figure, target, kind)
     except OSError as error:
-        raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
+        raise InputError(f"cannot write {target}: {files.reason(error)}") from error
 
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:

@@ -17,7 +17,7 @@ from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, val
 from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
-from ..files import files, hdf5, outputs, tables
+from ..files import files, outputs, tables
 from ..files.tables import Wanted
 from ..job import Job
 from ..job.history import Span, Timeline
@@ -223,15 +223,12 @@ def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySet
         known = not settings or there.with_name(FILE).is_file()
         return known and there.read_bytes().startswith(b"time,distance,pressure," if settings else heads)
 
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    lines = (map(float, values_of(table, row)) for row in rows)
+    with files.writing(path):
         with files.replaced(path, is_own) as file:
-            lines = (map(float, values_of(table, row)) for row in rows)
             file.write(to_csv(names_of(table), lines).encode())
         if settings:
             write_settings(path.parent, settings)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
     return path
 
 

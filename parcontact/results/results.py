@@ -20,7 +20,7 @@ import numpy as np
 
 from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
 from ..errors import InputError
-from ..files import fields, hdf5, outputs, tables
+from ..files import fields, files, hdf5, outputs, tables
 from ..files.tables import Claim, Columns
 from ..job import Job, Zener, yaml_text
 from ..job.listing import answers
@@ -59,15 +59,6 @@ class ResultTable(Columns):
         if missing := [name for name in needed if name not in self]:
             raise InputError(f"{self.path} has no column {', '.join(missing)}")
         return {name: np.array(values, dtype=float) for name, values in self.items()}
-
-    def pandas(self) -> Any:
-        """Return the table as a data frame, with the units of its columns in `attrs`; raises ImportError without
-        pandas."""
-        import pandas as pd  # type: ignore[import-untyped]
-
-        frame = pd.DataFrame(dict(self))
-        frame.attrs["units"] = self.units
-        return frame
 
 
 class Results:
@@ -277,7 +268,7 @@ class Results:
                 steps = ("t", file["step"][...][saved], {"units": "1"})
                 found = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
         except hdf5.FAILURES as error:
-            raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from None
+            raise InputError(f"{path} cannot be read: {files.reason(error)}") from None
         drawn = {
             f"{name}_map": (("t", "y", "x"), LazilyIndexedArray(rows), {"units": fields.UNITS[name]})
             for name, rows in found.items()

@@ -91,10 +91,10 @@ def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
         yield
 
 
-def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
+def save_figure(figure: Figure, path: Path, kind: str = "png") -> Path:
     """Write a png, pdf or svg marked with the name of this program, and return the path; replaces only marked files."""
     with files.replaced(path, files.is_marked) as file:
-        figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
+        figure.savefig(file, dpi=DPI, format=kind, metadata={MARKED[kind]: files.MARK})
     return path
 
 

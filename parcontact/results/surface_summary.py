@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import printed
 from ..errors import InputError
-from ..files import hdf5
+from ..files import files
 from ..job import Job, Topography, map_files, measured_maps
 from ..job.measured_maps import prepare
 from ..parallel.slab import Array
@@ -119,11 +119,8 @@ def describe_surface(
         lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
         lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")
-    try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
+    with files.writing(picture):
         draw_surface(Sketch(heights, job.grid.size, found, measured), picture)
-    except OSError as error:
-        raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
     yield from (*lines, *remarks)
     own = measured or found  # a measured map at its own points, which no mirror has made twice as long
     *heights_and_slopes, (name, hurst) = list_statistics(replace(found, hurst=own.hurst, hurst_error=own.hurst_error))

@@ -246,7 +246,7 @@ class Gaps:
                 self.fields = Fields(file, at)
                 self.shown = self.fields.shown
         except hdf5.FAILURES as error:
-            raise InputError(f"{directory / outputs.RUN.maps} cannot be read: {hdf5.reason(error)}; {NEEDS}") from None
+            raise InputError(f"{directory / outputs.RUN.maps} cannot be read: {files.reason(error)}; {NEEDS}") from None
         if not self.shown:
             raise InputError(f"{directory}: no map is saved yet")
 
