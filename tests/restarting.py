@@ -11,7 +11,7 @@ from csv_rows import measures as rows
 from mpi4py import MPI
 
 from parcontact import job
-from parcontact.files import run, tables
+from parcontact.files import outputs, run
 from parcontact.files.stopping import Options
 from parcontact.parallel.slab import Slab
 
@@ -121,8 +121,8 @@ def cut(bench: Bench, whole: Path, step: int) -> Path:
             if int(path.stem.removeprefix("step-")) > step:
                 path.unlink()
         if step == 0:  # before its first checkpoint
-            claims = tables.read_claims(copy)
-            tables.write_claims(copy, {"run": replace(claims["run"], saved=False)})
+            claims = outputs.read_claims(copy)
+            outputs.write_claims(copy, {"run": replace(claims["run"], saved=False)})
     bench.comm.Barrier()
     return copy
 

@@ -30,7 +30,7 @@ from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
 from ..errors import FAILED, STOPPED_EARLY, InputError
-from ..files import files, outputs, run, sweep, sweep_warnings, tables
+from ..files import files, outputs, run, sweep, sweep_warnings
 from ..files.directory import Directory
 from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
@@ -397,7 +397,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     with directory.claimed():
         plain = plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
-        directory.make(job.path, job.resolved(), tables.Claim(tables.kept(plain)))
+        directory.make(job.path, job.resolved(), outputs.Claim(outputs.kept(plain)))
         several = list(cases.values())
         shown = on_root(slab.comm, lambda: sweep_warnings.warn_once(several))
         warm_up(several[0].job, slab)

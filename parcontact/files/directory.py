@@ -18,8 +18,8 @@ from typing import Any
 from ..errors import InputError, InUseError
 from ..job.reading import CASES
 from ..parallel.slab import Slab
-from . import checkpoint, files, hdf5, outputs, tables
-from .tables import SCENE, Claim
+from . import checkpoint, files, hdf5, outputs
+from .outputs import SCENE, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
 LOCK = ".lock"
@@ -81,7 +81,7 @@ class Directory:
         def act() -> None:
             self._rename_foreign_files(job)
             self.claims = {**self.claims, self.verb: claim}
-            tables.write_claims(self.path, self.claims)
+            outputs.write_claims(self.path, self.claims)
             if self.outputs.checkpoints:
                 self.checkpoints.mkdir(exist_ok=True)
             copy, resolved_copy = self.outputs.copies
@@ -126,7 +126,7 @@ class Directory:
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
-                tables.write_claims(self.path, self.claims)
+                outputs.write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
         """Return steps and paths of the checkpoints of this verb, the newest first; root only."""
@@ -176,7 +176,7 @@ class Directory:
         files.refuse_pipes(self.path)
         self._take_lock()
         try:
-            self.claims = tables.read_claims(self.path)
+            self.claims = outputs.read_claims(self.path)
         except ValueError as error:
             raise InputError(
                 f"{error}, so the owner of {self.path} is unknown; give --out for another directory"
@@ -223,7 +223,7 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
     """Raise InputError if a foreign directory has files of these names (except hidden and `PERMITTED` files), or
     belongs to a sweep."""
     foreign = sorted(name for name in names if not name.startswith(".") and name not in PERMITTED)
-    if cases := len([*(directory / CASES).glob(f"*/{tables.MARKER}")]):
+    if cases := len([*(directory / CASES).glob(f"*/{outputs.MARKER}")]):
         raise InputError(
             f"the output directory {directory} belongs to a sweep and has {cases} of its cases; give --out for another "
             "directory, or run the job of the sweep, one case of it with --case"
@@ -241,10 +241,10 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
     """Raise InputError if a record in the directory belongs to another scene than the job `data` (plain data)."""
     for verb, claim in claims.items():
-        if found := tables.list_differences(tables.differences(claim.job, data, SCENE)):
+        if found := outputs.differences(claim.job, data, SCENE):
             raise InputError(
                 f"the output directory {directory} has {outputs.BY_VERB[verb].words} of another job: {found}; "
-                f"{tables.keep_mesh(claim.job, found)}give --out for another directory"
+                f"{outputs.keep_mesh(claim.job, found)}give --out for another directory"
             )
 
 

@@ -1,6 +1,26 @@
-"""Files that each verb writes into an output directory: what it claims, copies, continues, and is recognised by."""
+"""Files that each verb writes into an output directory: what it claims, copies and continues.
 
-from dataclasses import dataclass
+The marker of a directory has a claim for each verb that wrote it, with its job and the id of its run. Only files that
+the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
+"""
+
+import json
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..capabilities import folders
+from ..errors import InputError
+from . import files
+
+# sections in which all jobs of a directory must agree
+SCENE = ("grid", "bands", "surface", "material", *(one.SECTION for one in folders() if hasattr(one, "IN_SCENE")))
+_ADDED = {one.SECTION: one for one in folders() if hasattr(one, "SECTION")}
+# sections and keys of effects that change completed steps
+EFFECTS = tuple(key for one in _ADDED if one not in SCENE for key in getattr(_ADDED[one], "CHANGES_STEPS", (one,)))
+SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a job that a marker keeps
 
 
 @dataclass(frozen=True)
@@ -9,8 +29,8 @@ class Outputs:
 
     `words` call the results in messages. The `table` shows that there are results. Further files are tables, `maps`
     (HDF5), a `log` and `others`. `copies` are the job as given, and with every default. A verb that saves `checkpoints`
-    continues from the newest, others from their table. `complete` is a sentence on a finished table, with its last step
-    or its number of points.
+    continues from the newest, others from their table, if the sections and keys `same` of the job agree. `complete` is
+    a sentence on a finished table, with its last step or its number of points.
     """
 
     words: str
@@ -21,12 +41,17 @@ class Outputs:
     others: tuple[str, ...] = ()
     copies: tuple[str, ...] = ()
     checkpoints: str = ""
+    same: tuple[str, ...] = ()
     complete: str = ""
 
     @property
     def written(self) -> tuple[str, ...]:
         """Names of all results, which a new start removes."""
         return tuple(filter(None, (self.table, *self.tables, self.maps, self.log, *self.others)))
+
+    def changes(self, then: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+        """Return why a job (plain data) cannot continue another: their differences; '' if it can."""
+        return differences(then, now, self.same)
 
     @property
     def resolved(self) -> str:
@@ -51,6 +76,7 @@ RUN = Outputs(
     others=("fields.xdmf", MARCHES),
     copies=("job.yaml", "job.resolved.yaml"),
     checkpoints="checkpoint",
+    same=(*SCENE, *EFFECTS, "initial", *(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))),
     complete="its run has finished with step {}",
 )
 STEADY = Outputs(
@@ -61,6 +87,7 @@ STEADY = Outputs(
     log="steady.log",
     others=(LOST,),
     copies=("steady.job.yaml", "steady.resolved.yaml"),
+    same=(*SCENE, *EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")), "steady"),
     complete="its curve has {} points",
 )
 SWEEP = Outputs("a sweep", "sweep.csv", tables=(SWEPT_CURVES, "sweep_mean.csv", "sweep_curves_mean.csv"))
@@ -70,3 +97,91 @@ STUDY = Outputs(
 THEORY = Outputs("a theory", "theory.csv", tables=(STEADY_THEORY, BANDS_THEORY), others=("theory.yaml",))
 BY_VERB = {"run": RUN, "steady": STEADY, "sweep": SWEEP, "study": STUDY, "theory": THEORY}
 LOGS, MAPS = (RUN.log, STEADY.log), (RUN.maps, STEADY.maps)
+
+MARKER, FORMAT = ".parcontact", 1
+SHOWN = 4  # most differences of two jobs in a message
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Record of a command in an output directory: the `id` of its run, its job, and whether it `saved` a checkpoint;
+    the step and time (of a curve: the number of points) after which it `finished`; how surfaces `detached`."""
+
+    job: dict[str, Any]
+    id: str = field(default_factory=lambda: secrets.token_hex(16))
+    saved: bool = False
+    finished: tuple[int, float] | None = None
+    detached: str = ""
+
+
+def kept(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections of a job (plain data) that are stored in the marker file."""
+    return {name: data[name] for name in SECTIONS if name in data}
+
+
+def read_claims(directory: Path) -> dict[str, Claim]:
+    """Return the records of commands in a directory, by verb; empty without a marker. Raises OSError or ValueError."""
+    path = directory / MARKER
+    try:
+        text = path.read_bytes()
+    except FileNotFoundError:
+        return {}
+    try:
+        data = json.loads(text)
+        newer = data.pop("format") > FORMAT
+        if not newer:
+            return {verb: Claim(**{**claim, "finished": _pair(claim["finished"])}) for verb, claim in data.items()}
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise ValueError(f"{path} is damaged") from None
+    raise ValueError(f"{path} was written by a newer parcontact")
+
+
+def sound_claims(directory: Path) -> dict[str, Claim]:
+    """Return the records of commands in a directory; raises InputError for an unreadable marker."""
+    try:
+        return read_claims(directory)
+    except (OSError, ValueError) as error:
+        raise InputError(str(error)) from error
+
+
+def detached(directory: Path) -> str:
+    """Return how the surfaces of a run detached for good, '' if they did not; raises InputError."""
+    claim = sound_claims(directory).get("run")
+    return "" if claim is None else claim.detached
+
+
+def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:
+    return None if value is None else (int(value[0]), float(value[1]))
+
+
+def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
+    data = {"format": FORMAT, **{verb: asdict(claim) for verb, claim in claims.items()}}
+    files.replace_file(directory / MARKER, json.dumps(data, indent=1) + "\n")
+
+
+def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> str:
+    """Return the first differences of two jobs (plain data) in the named sections (`grid`) or keys (`numerics.kernel`),
+    with both values, and the number of further ones; '' if there is none."""
+    old, new = dict(_leaves("", then)), dict(_leaves("", now))
+    keys = (key for name in names for key in {**old, **new} if f"{key}.".startswith(f"{name}."))
+    found = [f"{key} was {old.get(key)}, is {new.get(key)}" for key in keys if old.get(key) != new.get(key)]
+    return "; ".join([*found[:SHOWN], *[f"and {len(found) - SHOWN} more"] * (len(found) > SHOWN)])
+
+
+def keep_mesh(job: Mapping[str, Any], different: str) -> str:
+    """Return advice to keep the mesh of a job (plain data) if the text `different` names it, else ''."""
+    if "grid.points" not in different:
+        return ""
+    points = str(job["grid"]["points"]).replace(" ", "")
+    return f"give --set grid.points={points} to keep its mesh, or "
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the values in nested mappings and lists by key, such as `surface.0.seed`."""
+    if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
+        value = dict(enumerate(value))
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
+    else:
+        yield name, value

@@ -16,13 +16,11 @@ from ..job.history import ChosenSteps, Step, Timeline, reached
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.entries import part_of
-from . import checkpoint, outputs, tables
+from . import checkpoint, outputs
 from .checkpoint import Contents
 from .directory import ADVICE, Directory
-from .tables import Claim
+from .outputs import Claim
 
-NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
-SAME = (*tables.SCENE, *tables.EFFECTS, "initial", *NUMERICS)  # sections and keys that must not change before a restart
 SAME_STEP = 1e-9  # rounding: relative difference below which steps of two histories are the same
 
 
@@ -62,7 +60,7 @@ def choose_origin(
 
 def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
     """Return the record of a run for the marker file; its id is kept if the run continues in its own directory."""
-    new = Claim(tables.kept(plain))
+    new = Claim(outputs.kept(plain))
     return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new
 
 
@@ -77,8 +75,7 @@ def finished_before(
             return ""
         steps, at = claim.finished
         whole = reached(at, timeline.end) if timeline.chooses else steps == len(timeline)
-        other = any(tables.differences(claim.job, plain, SAME))
-        if other or not whole or not (directory.path / outputs.RUN.table).exists():
+        if outputs.RUN.changes(claim.job, plain) or not whole or not (directory.path / outputs.RUN.table).exists():
             return ""
         return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it again)"
 
@@ -96,7 +93,7 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
     if problem := checkpoint.verify(found, slab):
         return problem
     if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
-        keys = on_root(slab.comm, lambda: tables.list_differences(tables.differences(found.job, plain, ["history"])))
+        keys = on_root(slab.comm, lambda: outputs.differences(found.job, plain, ["history"]))
         keys = f" ({keys})" if keys else ""
         other = f"to change what follows, end the running stage at t = {found.time:g} s and add another; or"
         earlier = "give --restart PATH to continue from an earlier checkpoint"
@@ -128,7 +125,7 @@ def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
     if claim is None or not found:
         return
     there = f"{directory.path} has {', '.join(found)}"
-    if different := tables.list_differences(tables.differences(claim.job, plain, SAME)):
+    if different := outputs.RUN.changes(claim.job, plain):
         raise InputError(f"{there} of another job: {different}; {ADVICE}")
     if claim.saved:
         how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
@@ -139,7 +136,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
     """Return the contents of a checkpoint, or why it cannot be used; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := tables.list_differences(tables.differences(contents.job, plain, SAME)):
+        if found := outputs.RUN.changes(contents.job, plain):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:

@@ -25,12 +25,11 @@ from ..parallel.slab import Slab
 from ..results import slide
 from ..results.results import Results
 from ..streams import Bar
-from . import files, hdf5, outputs, provenance, recorder, tables
+from . import files, hdf5, outputs, provenance, recorder
 from .directory import ADVICE, Directory
+from .outputs import Claim
 from .recorder import HEAD, Console, StepRow, step_line
-from .restart import SAME
 from .stopping import Options, watching
-from .tables import Claim
 
 RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
 
@@ -54,7 +53,7 @@ def run_history(job: Job, slab: Slab, options: Options) -> int:
             return DONE
         road = RoadHistory(job, slab)
         doubts = road.doubts(())
-        directory.make(job.path, job.resolved(), Claim({**tables.kept(plain), "history": plain.get("history")}))
+        directory.make(job.path, job.resolved(), Claim({**outputs.kept(plain), "history": plain.get("history")}))
         if not goes_on:
             directory.clear()
         console = Console(directory.path / outputs.RUN.log, options.quiet) if slab.root else Console(speaks=False)
@@ -95,7 +94,7 @@ def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -
         claim = directory.claim
         if afresh or claim is None:
             return False, ""
-        if different := tables.list_differences(tables.differences(claim.job, plain, SAME)):
+        if different := outputs.RUN.changes(claim.job, plain):
             raise InputError(f"{directory.path} has a run of another job: {different}; {ADVICE}")
         if claim.finished is None or claim.job.get("history") != plain["history"]:
             if claim.finished and not reached(sum(stage.seconds for stage in job.history), claim.finished[1]):
@@ -104,7 +103,7 @@ def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -
                     f"history would replace; {ADVICE}"
                 )
             if claim.finished and not _continues(claim.job["history"], plain["history"]):
-                different = tables.list_differences(tables.differences(claim.job, plain, ["history"]))
+                different = outputs.differences(claim.job, plain, ["history"])
                 raise InputError(f"{directory.path} has the results of another history: {different}; {ADVICE}")
             return True, ""
         if not all((directory.path / name).exists() for name in (outputs.RUN.table, outputs.BANDS)):

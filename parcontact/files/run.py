@@ -29,11 +29,11 @@ from ..results.results import Results
 from . import checkpoint, hdf5, outputs, provenance, recorder, restart, tables, wisdom
 from .checkpoint import Contents, Facts
 from .directory import Directory
+from .outputs import Claim
 from .provenance import Link, Provenance, cite_lines, extend_chain
 from .recorder import Recorder, Recording, StepRow
 from .restart import RestartPoint
 from .stopping import Options, Watch, watching
-from .tables import Claim
 
 
 class Run:

@@ -20,7 +20,7 @@ from ..parallel.tally import Groups
 from ..printed import name_cases, per_cent
 from ..results import sweep_table
 from ..results.results import Results
-from . import files, outputs, stopping, tables
+from . import files, outputs, stopping
 from .directory import refuse_files, refuse_other_jobs
 from .stopping import StopFile
 from .sweep_warnings import SweepWarnings
@@ -200,14 +200,14 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
             raise InputError(f"{path} is a symbolic link, which is not followed: remove it, or give --out")
     files.refuse_pipes(directory)
     try:
-        claims = tables.read_claims(directory)
+        claims = outputs.read_claims(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
     except (OSError, ValueError) as error:
         raise InputError(f"the output directory {directory} cannot be used: {error}") from error
     refuse_other_jobs(directory, claims, plain_job(first.job))
     for case in cases:
         there = case.job.output.directory
-        refuse_other_jobs(there, tables.sound_claims(there), plain_job(case.job))
+        refuse_other_jobs(there, outputs.sound_claims(there), plain_job(case.job))
     if not claims and not {CASES, outputs.SWEEP.table} & set(entries):
         refuse_files(directory, entries)
 

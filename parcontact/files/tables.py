@@ -1,16 +1,10 @@
-"""Tables and markers of an output directory: what is there, and how it is read and extended.
+"""Tables of an output directory: what is there, and how it is read and extended.
 
 Tables of numbers are csv files, which may be read while they grow.
-
-The marker of an output directory names the commands that wrote it (verbs), their jobs and run ids.
-
-Only files that the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
 
 Points of a friction curve are compared with the points in its table to find the missing ones.
 
 steady.lost.json has the points of a friction curve that could not be solved, with the reasons.
-
-Stop files make running programs stop.
 
 A growing table must have all rows that the marker or a checkpoint states. A table written at once must end with a whole
 line. Other tables are refused as incomplete.
@@ -19,15 +13,12 @@ line. Other tables are refused as incomplete.
 import json
 import math
 import os
-import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
-from itertools import islice, product
+from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
-from ..capabilities import folders
 from ..errors import InputError
 from ..printed import quantity
 from . import files, outputs
@@ -110,115 +101,6 @@ def read_columns(path: Path) -> Columns:
     return Columns(path, zip(names, series, strict=True))
 
 
-MARKER = ".parcontact"
-FORMAT = 1
-# sections in which all jobs of a directory must agree
-SCENE = ("grid", "bands", "surface", "material", *(one.SECTION for one in folders() if hasattr(one, "IN_SCENE")))
-SHOWN = 4  # most differences of two jobs in a message
-_ADDED = {one.SECTION: one for one in folders() if hasattr(one, "SECTION")}
-# sections and keys of effects that change completed steps
-EFFECTS = tuple(key for one in _ADDED if one not in SCENE for key in getattr(_ADDED[one], "CHANGES_STEPS", (one,)))
-SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a job that a marker keeps
-
-
-@dataclass(frozen=True)
-class Claim:
-    """Record of a command in an output directory: the `id` of its run, its job, and whether it `saved` a checkpoint;
-    the step and time (of a curve: the number of points) after which it `finished`; how surfaces `detached`."""
-
-    job: dict[str, Any]
-    id: str = field(default_factory=lambda: secrets.token_hex(16))
-    saved: bool = False
-    finished: tuple[int, float] | None = None
-    detached: str = ""
-
-
-def kept(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sections of a job (plain data) that are stored in the marker file."""
-    return {name: data[name] for name in SECTIONS if name in data}
-
-
-def read_claims(directory: Path) -> dict[str, Claim]:
-    """Return the records of commands in a directory, by verb; empty without a marker. Raises OSError or ValueError."""
-    path = directory / MARKER
-    try:
-        text = path.read_bytes()
-    except FileNotFoundError:
-        return {}
-    try:
-        data = json.loads(text)
-        newer = data.pop("format") > FORMAT
-        if not newer:
-            return {verb: Claim(**{**claim, "finished": _pair(claim["finished"])}) for verb, claim in data.items()}
-    except (ValueError, TypeError, KeyError, AttributeError):
-        raise ValueError(f"{path} is damaged") from None
-    raise ValueError(f"{path} was written by a newer parcontact")
-
-
-def sound_claims(directory: Path) -> dict[str, Claim]:
-    """Return the records of commands in a directory; raises InputError for an unreadable marker."""
-    try:
-        return read_claims(directory)
-    except (OSError, ValueError) as error:
-        raise InputError(str(error)) from error
-
-
-def claim_of_run(directory: Path) -> Claim | None:
-    """Return the record of the run in a directory, or None; raises InputError for an unreadable marker."""
-    return sound_claims(directory).get("run")
-
-
-def detached(directory: Path) -> str:
-    """Return how the surfaces of a run detached for good, '' if they did not; raises InputError."""
-    claim = claim_of_run(directory)
-    return "" if claim is None else claim.detached
-
-
-def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:
-    return None if value is None else (int(value[0]), float(value[1]))
-
-
-def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
-    data = {"format": FORMAT, **{verb: asdict(claim) for verb, claim in claims.items()}}
-    files.replace_file(directory / MARKER, json.dumps(data, indent=1) + "\n")
-
-
-def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
-    """Yield the differences of two jobs (plain data) in the named sections (`grid`) or keys (`numerics.kernel`), with
-    both values."""
-    old, new = dict(_leaves("", then)), dict(_leaves("", now))
-    for name in names:
-        for key in (key for key in {**old, **new} if f"{key}.".startswith(f"{name}.")):
-            if old.get(key) != new.get(key):
-                yield f"{key} was {old.get(key)}, is {new.get(key)}"
-
-
-def list_differences(differences: Iterator[str]) -> str:
-    """Return a line with the first differences and the number of further ones."""
-    first = list(islice(differences, SHOWN))
-    more = sum(1 for _ in differences)
-    return "; ".join(first) + (f"; and {more} more" if more else "")
-
-
-def keep_mesh(job: Mapping[str, Any], different: str) -> str:
-    """Return advice to keep the mesh of a job (plain data) if the text `different` names it, else ''."""
-    if "grid.points" not in different:
-        return ""
-    points = str(job["grid"]["points"]).replace(" ", "")
-    return f"give --set grid.points={points} to keep its mesh, or "
-
-
-def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the values in nested mappings and lists by key, such as `surface.0.seed`."""
-    if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
-        value = dict(enumerate(value))
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
-    else:
-        yield name, value
-
-
 CLOSE = 1e-6  # rounding: relative difference below which speeds and pressures are the same
 
 Place = tuple[float, ...]  # speed [m/s], mean pressure [Pa], and temperature [deg C]
@@ -262,6 +144,7 @@ def is_same(one: Place, other: Place) -> bool:
     return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
 
 
+SHOWN = 4  # most lost points of a reason, and reasons, in a message
 PLACE = ("velocity", "pressure", "temperature")
 
 
@@ -365,7 +248,7 @@ def refuse_cut(path: Path) -> None:
 def find_lost_rows(directory: Path) -> str:
     """Return a message if the table of a finished run is damaged or lacks rows, or ''; raises InputError for an
     unreadable marker."""
-    claim = claim_of_run(directory)
+    claim = outputs.sound_claims(directory).get("run")
     if claim is None or claim.finished is None:
         return ""
     path = directory / outputs.RUN.table
@@ -387,7 +270,7 @@ def _find_ends(path: Path) -> Iterator[tuple[float, str]]:
     """Yield the last step, or the number of points, that a table must have, with the reason. Raises InputError for an
     unreadable marker."""
     for verb, each in outputs.BY_VERB.items():
-        claim = sound_claims(path.parent).get(verb) if each.complete and path.name == each.table else None
+        claim = outputs.sound_claims(path.parent).get(verb) if each.complete and path.name == each.table else None
         if claim is not None and claim.finished is not None:
             yield claim.finished[0], each.complete.format(claim.finished[0])
     if path.name == outputs.RUN.table:

@@ -240,9 +240,6 @@ def _percent(share: float) -> str:
     return "     -" if math.isnan(share) else "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"
 
 
-SAME = (*tables.SCENE, *tables.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
-
-
 @dataclass(frozen=True)
 class Request:
     """Request for steady states at each combination of velocity, pressure and temperature.
@@ -371,7 +368,7 @@ def run_curve(
         sliding = make(job, slab)
         wisdom.keep(transforms, slab)
         doubts = sliding.doubts(wanted.temperatures)
-        directory.make(job.path, job.resolved(), tables.Claim(plain))
+        directory.make(job.path, job.resolved(), outputs.Claim(plain))
         if not goes_on:
             directory.clear()
         table = _table(directory.path, sliding, wanted, options.quiet)
@@ -394,7 +391,7 @@ def run_curve(
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
     """Return the data that identify a curve; of the `steady` section only those that must agree for all points."""
     steady = {"direction": list(wanted.direction), "waves": wanted.waves}
-    return {**tables.kept(listing.plain_job(job)), "steady": steady}
+    return {**outputs.kept(listing.plain_job(job)), "steady": steady}
 
 
 def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
@@ -402,8 +399,8 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     advice on keeping several meshes."""
     if (claim := directory.claim) is None or not directory.results():
         return False
-    if different := tables.list_differences(tables.differences(claim.job, plain, (*SAME, "steady"))):
-        kept = tables.keep_mesh(claim.job, different)
+    if different := outputs.STEADY.changes(claim.job, plain):
+        kept = outputs.keep_mesh(claim.job, different)
         raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {kept}{ADVICE}")
     return True
 

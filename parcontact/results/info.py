@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .. import capabilities
 from ..errors import InputError
-from ..files import checkpoint, fields, files, hdf5, outputs, tables
+from ..files import checkpoint, fields, files, hdf5, outputs
 from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
 from ..job import Job, Stage, yaml_text
@@ -120,7 +120,7 @@ def describe_files(directory: Path) -> tuple[str, bool]:
     """Return a description of an output directory, and True if all of it is readable; raises InputError if it has no
     results."""
     try:
-        claims = tables.read_claims(directory)
+        claims = outputs.read_claims(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {files.reason(error)}", False
     if not claims and not any((directory / name).exists() for name in (outputs.RUN.table, outputs.SWEEP.table)):

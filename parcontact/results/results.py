@@ -21,7 +21,8 @@ import numpy as np
 from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
 from ..errors import InputError
 from ..files import fields, files, hdf5, outputs, tables
-from ..files.tables import Claim, Columns
+from ..files.outputs import Claim
+from ..files.tables import Columns
 from ..job import Job, Zener, yaml_text
 from ..job.listing import answers
 from ..job.reading import CASES, shown_job
@@ -141,13 +142,13 @@ class Results:
 
     @property
     def claims(self) -> dict[str, Claim]:
-        """Records of the commands that wrote the directory (`files.tables.Claim`), by verb."""
-        return tables.sound_claims(self.path)
+        """Records of the commands that wrote the directory (`files.outputs.Claim`), by verb."""
+        return outputs.sound_claims(self.path)
 
     @cached_property
     def detached(self) -> str:
         """Text on how the surfaces of a run detached for good; '' if they did not."""
-        return self._detached or tables.detached(self.path)
+        return self._detached or outputs.detached(self.path)
 
     @property
     def telling_row(self) -> int:

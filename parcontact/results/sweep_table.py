@@ -159,7 +159,7 @@ def state(case: Case) -> str:
         return "done"
     steps = [int(step) for step in columns["step"]]
     timeline = Timeline.from_job(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
-    return "done" if steps and (steps[-1] >= len(timeline) or tables.detached(directory)) else "begun"
+    return "done" if steps and (steps[-1] >= len(timeline) or outputs.detached(directory)) else "begun"
 
 
 def _means(

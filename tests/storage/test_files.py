@@ -11,12 +11,13 @@ import pytest
 
 from parcontact.columns import MEASURES, choose_columns
 from parcontact.errors import InputError, InUseError
-from parcontact.files import directory, files, tables, wisdom
+from parcontact.files import directory, files, outputs, tables, wisdom
 from parcontact.files.checkpoint import TableMark
 from parcontact.files.directory import Directory
+from parcontact.files.outputs import Claim
 from parcontact.files.provenance import Link, Provenance
 from parcontact.files.recorder import MeasuresFile, Recorder, Recording, StepRow, cut_back_table
-from parcontact.files.tables import Claim, GrowingTable, lacking_points, of_table, read_results, requested_points
+from parcontact.files.tables import GrowingTable, lacking_points, of_table, read_results, requested_points
 from parcontact.job import load
 from parcontact.march.choices import choices
 from parcontact.parallel.slab import Slab
@@ -112,7 +113,7 @@ def test_second_run_is_refused(tmp_path: Path, job: Path, monkeypatch: pytest.Mo
     make(second, job)
     assert second.claim is not None
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        tables.MARKER,
+        outputs.MARKER,
         "checkpoint",
         "job.resolved.yaml",
         "job.yaml",
@@ -139,7 +140,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     keep = r"grid.points was \[8, 8\], is \[9, 9\]; give --set grid.points=\[8,8\] to keep its mesh, or give --out"
     with pytest.raises(InputError, match=keep):
         make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
-    (out / tables.MARKER).write_text("{")
+    (out / outputs.MARKER).write_text("{")
     with pytest.raises(InputError, match="is damaged, so the owner of"):
         make(directory_at(out), job)
 
@@ -166,10 +167,8 @@ def test_differences_of_jobs() -> None:
         "surface": [{"shape": "wave", "seed": 2}],
         "numerics": {"kernel": "love", "x": 2},
     }
-    assert list(tables.differences(then, now, ("grid", "surface", "numerics.kernel", "initial"))) == [
-        "grid.points was [8, 8], is [8, 9]",
-        "surface.0.seed was 1, is 2",
-    ]
+    found = outputs.differences(then, now, ("grid", "surface", "numerics.kernel", "initial"))
+    assert found == "grid.points was [8, 8], is [8, 9]; surface.0.seed was 1, is 2"
 
 
 # -- fFTW's wisdom is kept for runs with the same transforms, where nobody else can have put it -----------------------
