@@ -5,7 +5,6 @@ The lock is taken first; then the ownership of the directory is checked, and onl
 import errno
 import fcntl
 import os
-import re
 import shutil
 import socket
 import time
@@ -130,12 +129,7 @@ class Directory:
 
     def saved(self) -> list[tuple[int, Path]]:
         """Return steps and paths of the checkpoints of this verb, the newest first; root only."""
-        found = [
-            (int(match.group(1)), path)
-            for path in (self.checkpoints.glob("step-*.h5") if self.outputs.checkpoints else ())
-            if (match := re.fullmatch(r"step-(\d+)\.h5", path.name))
-        ]
-        return sorted(found, reverse=True)
+        return outputs.find_checkpoints(self.path) if self.outputs.checkpoints else []
 
     def results(self) -> list[str]:
         """Return the names of this verb's existing results; root only."""
@@ -155,7 +149,7 @@ class Directory:
 
     def _has_checkpoints(self) -> bool:
         """Return True if the directory has sound checkpoints, as a copy without its marker has."""
-        return any(checkpoint.is_one(path) for path in self.checkpoints.glob("step-*.h5"))
+        return any(checkpoint.is_one(path) for _, path in outputs.find_checkpoints(self.path))
 
     def _rename_foreign_files(self, job: Path) -> None:
         """Rename files with the names of this verb's results if neither the marker nor a checkpoint proves their

@@ -98,6 +98,13 @@ THEORY = Outputs("a theory", "theory.csv", tables=(STEADY_THEORY, BANDS_THEORY),
 BY_VERB = {"run": RUN, "steady": STEADY, "sweep": SWEEP, "study": STUDY, "theory": THEORY}
 LOGS, MAPS = (RUN.log, STEADY.log), (RUN.maps, STEADY.maps)
 
+
+def find_checkpoints(directory: Path) -> list[tuple[int, Path]]:
+    """Return steps and paths of the checkpoints in a directory of results, the newest first."""
+    found = directory.glob(f"{RUN.checkpoints}/step-*.h5")
+    return sorted(((int(path.stem[5:]), path) for path in found if path.stem[5:].isdecimal()), reverse=True)
+
+
 MARKER, FORMAT = ".parcontact", 1
 SHOWN = 4  # most differences of two jobs in a message
 

@@ -274,6 +274,5 @@ def _find_ends(path: Path) -> Iterator[tuple[float, str]]:
         if claim is not None and claim.finished is not None:
             yield claim.finished[0], each.complete.format(claim.finished[0])
     if path.name == outputs.RUN.table:
-        saved = [int(one.stem[5:]) for one in path.parent.glob("checkpoint/step-*.h5") if one.stem[5:].isdecimal()]
-        if saved:
-            yield max(saved), f"its run has a checkpoint after step {max(saved)}"
+        for step, _ in outputs.find_checkpoints(path.parent)[:1]:
+            yield step, f"its run has a checkpoint after step {step}"

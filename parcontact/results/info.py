@@ -211,7 +211,7 @@ def _curve(found: Results) -> Iterator[str]:
 
 
 def _saved_states(found: Results) -> Iterator[str]:
-    for path in sorted(found.path.glob("checkpoint/step-*.h5")):
+    for _, path in reversed(outputs.find_checkpoints(found.path)):
         contents = checkpoint.inspect(path)
         yield f"  checkpoint after step {contents.step}, t = {quantity(contents.time, 's', 4)}"
 

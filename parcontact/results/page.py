@@ -127,7 +127,7 @@ def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job
 def origin_section(directory: Path, found: Log) -> ReportSection:
     """Return the section on provenance, from the newest file of a directory that states it."""
     there = [directory / name for name in outputs.MAPS if (directory / name).is_file()]
-    there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    there += [path for _, path in outputs.find_checkpoints(directory)]
     for path in there:
         try:
             with Results(directory).open_maps(str(path.relative_to(directory))) as file:
