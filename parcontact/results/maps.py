@@ -182,7 +182,7 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[Panel]], list[P
             if narrow:
                 return [pressures], list(traction_panels(run, fields))
             found = list(_panels(run, fields)) if fields.saved else []
-            wide = run.job.grid.lx > WIDE * run.job.grid.ly
+            wide = run.job.grid.lx > WIDE * run.job.grid.ly  # one in a row
             return ([pressures, *([one] for one in found)], []) if wide else ([pressures], found)
     except (OSError, KeyError):
         if at:
@@ -210,11 +210,8 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
     limits = find_range(part)
     beyond = bool(np.nanmax(part, initial=-np.inf) > limits[1])
     drawn = _colors(name, (fields.x[columns], fields.y[rows]), part, limits, beyond)
-    return Panel("maps", *PLACES, title=f"{_words(name)}{LOOKS[name].note}\n{instant}", colors=drawn)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    title = f"{name.replace('_', ' ')}{LOOKS[name].note}\n{instant}"
+    return Panel("maps", *PLACES, title=title, colors=drawn)
 
 
 def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
@@ -279,7 +276,7 @@ def _colors(
     if name == "pressure" and low < 0.0:  # white at pressure 0
         look, low, high = look._replace(colors=TENSION), min(low, -high), max(-low, high)
     ends = [end for along in points for end in (along[0], 2 * along[-1] - along[-2])]
-    of = Axis(_words(name), look.unit)
+    of = Axis(name.replace("_", " "), look.unit)
     return Colors(values, (*ends,), of, low, high, look.colors, look.blank, clipped)
 
 
@@ -288,7 +285,7 @@ def _line(name: str, points: tuple[Array, Array], values: Array, limits: tuple[f
     lies, (low, high) = points[0].size > points[1].size, limits
     line = Line("", points[0] if lies else points[1], _along(values), {"color": style.BLUE})
     shown = (low, low + 1.05 * (high - low)) if high > low else None
-    of = Axis(_words(name), LOOKS[name].unit)
+    of = Axis(name.replace("_", " "), LOOKS[name].unit)
     return Panel("maps", PLACES[not lies], of, [line], bottom=False, y_range=shown)
 
 
@@ -330,14 +327,13 @@ def draw_frames(
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
     figure, points = Figure(figsize=size, dpi=dpi, layout="constrained"), (file["x"][...], file["y"][...])
     axes, canvas = figure.subplots(), FigureCanvasAgg(figure)
-    narrow = min(one.size for one in points) <= STRIP
-    index, label = next(iter(labels.items()))
-    panel = (
-        _line(name, points, read(index), limits)
-        if narrow
-        else Panel("maps", *PLACES, colors=_colors(name, points, read(index), limits))
-    )
-    draw(replace(panel, title=f"{_words(name)}, {label}"), axes)
+    titles = {index: f"{name.replace('_', ' ')}, {label}" for index, label in labels.items()}
+    narrow, first = min(one.size for one in points) <= STRIP, next(iter(labels))
+    if narrow:
+        panel = _line(name, points, read(first), limits)
+    else:
+        panel = Panel("maps", *PLACES, colors=_colors(name, points, read(first), limits))
+    draw(replace(panel, title=titles[first]), axes)
     lines = (one for one in axes.spines.values() if one.get_visible())
     changing = (*axes.images, *axes.lines, *lines, axes.title)
     style.arrange(figure)  # the layout of the first frame is kept for all
@@ -348,12 +344,12 @@ def draw_frames(
     background = canvas.copy_from_bbox(figure.bbox)
     for one in changing:
         one.set_visible(True)
-    for index, label in labels.items():
+    for index, title in titles.items():
         if narrow:
             axes.lines[0].set_ydata(_along(read(index)))
         else:
             axes.images[0].set_data(drawn_points(read(index)))
-        axes.set_title(f"{_words(name)}, {label}")
+        axes.set_title(title)
         canvas.restore_region(background)
         for one in changing:
             axes.draw_artist(one)

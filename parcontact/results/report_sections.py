@@ -237,7 +237,7 @@ def describe_run(directory: Path) -> ReportSection:
     columns = run.table
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
-        (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
+        (name.replace("_", " "), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
         for name, values in known.items()
         if values and (run.job.directions or not name.startswith("friction"))
     ]
@@ -267,7 +267,7 @@ def describe_curve(directory: Path) -> ReportSection:
     curve = Results(directory, "steady")
     columns = curve.table
     names = [name for name in POINTS if name in columns]
-    head = [_to_words(_add_unit(name)) for name in names]
+    head = [_add_unit(name).replace("_", " ") for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_panel(panel) for panel in band_charts.panels_of_curve(directory)]
     states = partial(_label_states, curve.free_area)
@@ -328,10 +328,6 @@ def describe_study(directory: Path) -> ReportSection:
     table = _shorten(list(rows[0]) if rows else [], [list(row.values()) for row in rows])
     sentences = study.sentences_of_study or ["The study is not finished."]
     return ReportSection("Cost of accuracy", sentences, [table], _stored(directory, STUDY_PICTURES))
-
-
-def _to_words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _shorten(head: Sequence[str], rows: Sequence[Sequence[object]]) -> ReportTable:

@@ -73,11 +73,7 @@ NARROW = 3.5  # width below which a panel is narrow [inch]
 ROOM, LETTER = 0.45, 0.075  # width of an entry of a legend without its name, and mean width of a letter [inch]
 MARGIN = 0.2  # least width of a panel that a legend below it leaves free [inch]
 UNDER_AXES, GAP = 0.5, 0.05  # height of the labels below axes, and around a legend [inch]
-MARKED = {
-    "png": "Software",
-    "pdf": "Creator",
-    "svg": "Creator",
-}  # key of the metadata that names the program, by format
+MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # key of the metadata that names the program
 
 
 @contextmanager
@@ -107,9 +103,7 @@ def plain(text: str, most: int = 1000) -> str:
 
 def colors(count: int) -> list[str]:
     """Return `count` different colours of lines: a sequence if the colours for colour-blind readers are too few."""
-    if count <= len(COLORS):
-        return list(COLORS[:count])
-    return sequence(count)
+    return list(COLORS[:count]) if count <= len(COLORS) else sequence(count)
 
 
 def sequence(count: int) -> list[str]:
@@ -193,11 +187,11 @@ def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
     Entries that several panels share are placed once, below the last row. Other entries are placed in their panel, or
     below it if there are many.
     """
-    entries = {axes: _find_entries(axes) for row in rows for axes in row}
+    found = ((axes, *axes.get_legend_handles_labels()) for row in rows for axes in row)
+    entries = {axes: dict(zip(names, handles, strict=True)) for axes, handles, names in found}
     counts = Counter((name, _find_look(handle)) for own in entries.values() for name, handle in own.items())
-    shared = {
-        name: handle for own in entries.values() for name, handle in own.items() if counts[name, _find_look(handle)] > 1
-    }
+    pairs = (pair for own in entries.values() for pair in own.items())
+    shared = {name: handle for name, handle in pairs if counts[name, _find_look(handle)] > 1}
     heights = []
     for row in rows:
         own = [{name: handle for name, handle in entries[axes].items() if name not in shared} for axes in row]
@@ -206,12 +200,6 @@ def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
         figure = rows[-1][-1].figure
         heights[-1] += _add_below(figure, shared, _width(figure), loc="outside lower center")
     return heights
-
-
-def _find_entries(axes: Axes) -> dict[str, Artist]:
-    """Return the entries of the legend of a panel."""
-    handles, names = axes.get_legend_handles_labels()
-    return dict(zip(names, handles, strict=True))
 
 
 def _find_look(handle: Any) -> tuple[str, ...]:

@@ -128,7 +128,8 @@ def rings_of_spectrum(
     k = smallest * np.exp(logarithm * x**2)
     areas = 2 * x * logarithm * k**2 * (half * weights).ravel()  # k dk
     angles = refinement * QUADRANT_ANGLES + ANGLES_STEP * np.ceil(k * distance / 2 / ANGLES_STEP).astype(int)
-    parts = [_ring(*ring) for ring in zip(k, areas, angles, strict=True)]
+    unit = map(_two_quadrants, angles)  # Gauss points of two quadrants
+    parts = [(q * x, q * y, area * share) for q, area, (x, y, share) in zip(k, areas, unit, strict=True)]
     kx, ky, area = (np.concatenate(part) for part in zip(*parts, strict=True))
     amplitude = np.sqrt(spectrum(np.hypot(kx, ky)) * area) / np.pi  # |A|^2/2: mean square of a wave and its opposite
     starts = np.cumsum([0, *(part[0].size for part in parts[:-1])])
@@ -147,14 +148,9 @@ def _edges(smallest: float, logarithm: float, distance: float, kinks: Sequence[f
     return np.concatenate([*(np.linspace(a, b, count, endpoint=False) for a, b, count in panels), [1.0]])
 
 
-def _ring(k: float, area: float, angles: int) -> tuple[Array, Array, Array]:
-    """Return kx, ky and the area in the plane of wave vectors of each wave of a ring: Gauss points of two quadrants."""
-    cosines, sines, weights = _two_quadrants(angles)
-    return k * cosines, k * sines, area * weights
-
-
 @cache
 def _two_quadrants(count: int) -> tuple[Array, Array, Array]:
+    """Return cosines and sines of angles in two quadrants, and the area of each over k dk; shapes (2 count,)."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     angle = np.pi / 4 * np.concatenate([nodes - 1, nodes + 1])
     return np.cos(angle), np.sin(angle), np.pi / 4 * np.tile(weights, 2)
