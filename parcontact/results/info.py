@@ -154,7 +154,8 @@ def _run(found: Results) -> Iterator[str]:
         yield f"  {run.detached}"
     yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
     job = run.job
-    names = {name: unit for name, unit in LAST_ROW.items() if name in columns and (name != "friction" or _slides(job))}
+    noise = {"friction"} if job is not None and not job.directions else set[str]()  # where nothing slides
+    names = {name: unit for name, unit in LAST_ROW.items() if name in columns and name not in noise}
     last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
@@ -168,11 +169,6 @@ def describe_run_in_words(run: Results) -> Iterator[str]:
         yield from slide.describe_cycles(job, slide.find_cycles(job, run.table))
     for sentences in answers("results", "sentences"):
         yield from sentences(run)
-
-
-def _slides(job: Job | None) -> bool:
-    """Return True if something slides in a job, or if the job is unknown; without sliding friction is noise."""
-    return job is None or bool(job.directions)
 
 
 def _theory(found: Results) -> Iterator[str]:
@@ -233,7 +229,14 @@ def _sweep(found: Results) -> Iterator[str]:
     states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"
-    yield from _describe_running(found)
+    open_cases = [int(row["case"]) for row in rows if row["state"] in ("-", "begun")]
+    for number in open_cases:
+        if progress := Results(found.path / CASES / f"{number:03d}").progress:
+            yield f"  case {number}: {progress}"
+    known = [row["seconds"] for row in rows if row["state"] == "done" and row.get("seconds", math.nan) > 0.0]
+    if open_cases and known:
+        left = quantity(len(open_cases) * sum(known) / len(known), "s", 2)
+        yield f"  {len(open_cases)} cases to go: {left}, one after the other, if they take as long"
     yield from (f"  {text}" for text in found.failed_cases(SHOWN))
     done = [int(row["case"]) for row in rows if row["state"] == "done"]
     for number in done[:SHOWN]:
@@ -241,19 +244,6 @@ def _sweep(found: Results) -> Iterator[str]:
             yield f"  case {number}: {text}"
     if len(done) > SHOWN:
         yield f"  and {len(done) - SHOWN} more"
-
-
-def _describe_running(sweep: Results) -> Iterator[str]:
-    """Yield how far the cases of a sweep are that have begun and are not finished, and the time that is left."""
-    open_cases = [int(row["case"]) for row in sweep.cases if row["state"] in ("-", "begun")]
-    for number in open_cases:
-        case = Results(sweep.path / CASES / f"{number:03d}")
-        if case.progress:
-            yield f"  case {number}: {case.progress}"
-    known = [row["seconds"] for row in sweep.cases if row["state"] == "done" and row.get("seconds", math.nan) > 0.0]
-    if open_cases and known:
-        left = len(open_cases) * sum(known) / len(known)
-        yield f"  {len(open_cases)} cases to go: {quantity(left, 's', 2)}, one after the other, if they take as long"
 
 
 Describe = Callable[[Results], Iterator[str]]

@@ -136,10 +136,8 @@ class Panel:
 
 def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
     """Draw a panel without its legend. `log` names logarithmic axes, which are linear without positive points."""
-    log_x, log_y = (
-        "none" not in log and (panel.log_x or "x" in log),
-        "none" not in log and bool(panel.log_y or panel.zeros or "y" in log),
-    )
+    log_x = "none" not in log and (panel.log_x or "x" in log)
+    log_y = "none" not in log and bool(panel.log_y or panel.zeros or "y" in log)
     series = [_drop_hidden_points(one, log_x, log_y) for one in panel.series]
     if not any(np.isfinite(one.x * one.y).any() for one in series):
         log_x = log_y = False
@@ -159,13 +157,16 @@ def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
 
 
 def _draw_lines(axes: Axes, series: Sequence[Line]) -> None:
-    """Draw lines with the bars of their errors; with marks if none has two points."""
+    """Draw lines with the bars of their known errors; with marks if none has two points. A bar of more than the value
+    ends just above 0."""
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
     for one in series:
         if one.stack is None:
             axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
             if one.error is not None:
-                _draw_errors(axes, one, one.error)
+                size = np.where(np.isfinite(one.error), np.abs(one.error * one.y), 0.0)
+                look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
+                axes.errorbar(one.x, one.y, yerr=[np.minimum(size, LEAST * np.abs(one.y)), size], fmt="none", **look)
 
 
 def _set_scales(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool, log_y: bool) -> None:
@@ -279,13 +280,6 @@ def _mark_zeros(axes: Axes, panel: Panel) -> None:
             look: dict[str, Any] = {"color": one.look["color"], "marker": "x", "linestyle": "none", "ms": 4}
             axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label or None, **look)
             label = ""
-
-
-def _draw_errors(axes: Axes, one: Line, share: Array) -> None:
-    """Draw bars of the known errors; a bar of more than the value ends just above 0."""
-    size = np.where(np.isfinite(share), np.abs(share * one.y), 0.0)
-    look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
-    axes.errorbar(one.x, one.y, yerr=[np.minimum(size, LEAST * np.abs(one.y)), size], fmt="none", **look)
 
 
 def set_scale(axes: Axes, which: str, of: Axis, log: bool) -> None:

@@ -376,15 +376,11 @@ def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
         (run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]]))
         for number, rows in run.rows_of_stages.items()
     ]
-    return Abscissa(axis, values, shades=_shade([stage for stage in stages if stage[1] < stage[2]]))
-
-
-def _shade(stages: Sequence[tuple[str, float, float]]) -> list[Shade]:
-    """Return the shades of several stages with their starts and ends, each name in its colour."""
+    stages = [stage for stage in stages if stage[1] < stage[2]]
     names = list(dict.fromkeys(name for name, _, _ in stages))
     colors = dict(zip(names, style.sequence(len(names)), strict=True))
     shades = [Shade(*stage, color=style.mix(colors[stage[0]], STAGE_WHITE)) for stage in stages]
-    return shades if len(stages) > 1 else []
+    return Abscissa(axis, values, shades=shades if len(stages) > 1 else [])
 
 
 def _choose_velocity(run: PlottedRun) -> Abscissa:

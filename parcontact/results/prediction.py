@@ -170,10 +170,6 @@ def draw_curve(job: Job, wanted: Request) -> Path:
     """Draw the friction curve of a job, with the theory if it needs no heights. Return the path of the picture."""
     if has_spectrum(job):
         write_steady(job, wanted)
-    return _draw(job)
-
-
-def _draw(job: Job) -> Path:
     from . import plots
 
     return plots.draw_steady(job.output.directory / outputs.STEADY.table)
@@ -200,8 +196,10 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     if not has_spectrum(job):
         raise InputError(f"{ONE_ROUGH.partition(';')[0]}" if job.bands is None else OF_SPECTRA)
     highest = write_steady(job, request(job))
-    if (job.output.directory / outputs.STEADY.table).is_file():
-        _draw(job)
+    if (table := job.output.directory / outputs.STEADY.table).is_file():
+        from . import plots
+
+        plots.draw_steady(table)
     place = Wanted(highest.velocity, highest.pressure, highest.temperature)
     return [
         f"Persson's theory, {settings.sentence}: {job.output.directory / outputs.STEADY_THEORY}",
