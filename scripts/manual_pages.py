@@ -20,11 +20,11 @@ import matplotlib
 
 matplotlib.use("Agg")
 
+from parcontact.door import manual_texts
 from parcontact.door.arguments import describe_verbs
-from parcontact.door.manual import texts
 
 ROOT = Path(__file__).resolve().parents[1]
-NOTEBOOKS = texts.PAGES.parent / "notebooks"
+NOTEBOOKS = manual_texts.PAGES.parent / "notebooks"
 
 
 def main() -> int:
@@ -34,11 +34,11 @@ def main() -> int:
     options = parser.parse_args()
     target: Path = options.to
     target.mkdir(parents=True, exist_ok=True)
-    for name in texts.page_names():
-        (target / f"{name}.md").write_text(texts.page(name, {"verbs": describe_verbs}))
-    shutil.copy(texts.PAGES.parent / "conf.py", target)
+    for name in manual_texts.page_names():
+        (target / f"{name}.md").write_text(manual_texts.page(name, {"verbs": describe_verbs}))
+    shutil.copy(ROOT / "scripts" / "sphinx_conf.py", target / "conf.py")
     (target / "static").mkdir(exist_ok=True)
-    shutil.copy(texts.PAGES.parent / "manual.css", target / "static")
+    shutil.copy(manual_texts.PAGES.parent / "manual.css", target / "static")
     shutil.copytree(ROOT / "jobs" / "pictures", target / "pictures", dirs_exist_ok=True)
     for notebook in sorted(NOTEBOOKS.glob("*.ipynb")):
         text = "\n\n".join(pieces(notebook, target, not options.no_notebooks))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import yaml
 from marched_jobs import ROOT
 
-from parcontact.door.manual import texts
+from parcontact.door import manual_texts
 from parcontact.errors import InputError
 from parcontact.job import yaml_text
 from parcontact.march import mesh
@@ -34,7 +34,7 @@ def every_job() -> Iterator[Found]:
     for path in sorted((ROOT / "jobs").rglob("*.yaml")):
         if "materials" not in path.parts:
             yield Found(path.relative_to(ROOT / "jobs").with_suffix("").as_posix(), path.read_text(), path.parent)
-    pages = {name: texts.page(name, {"verbs": lambda: ""}) for name in texts.page_names()}
+    pages = {name: manual_texts.page(name, {"verbs": lambda: ""}) for name in manual_texts.page_names()}
     for name, page in {**pages, "README": (ROOT / "README.md").read_text()}.items():
         for index, text in enumerate(re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)):
             yield Found(f"{name} {index}", text, ROOT / "jobs" / "road")

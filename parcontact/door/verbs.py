@@ -495,11 +495,13 @@ def manual(options: argparse.Namespace) -> int:
     """Print a page of the manual, or list all pages."""
     import shutil
 
-    from .manual import texts
+    from . import manual_texts
 
     width = min(shutil.get_terminal_size().columns, 100)
     print(
-        texts.plain_page(options.page, {"verbs": options.describe_verbs}, width) if options.page else texts.contents()
+        manual_texts.plain_page(options.page, {"verbs": options.describe_verbs}, width)
+        if options.page
+        else manual_texts.contents()
     )
     return DONE
 

@@ -10,9 +10,8 @@ from marched_jobs import JOBS
 from mpi4py import MPI
 
 from parcontact import __main__
-from parcontact.door import doctor
+from parcontact.door import doctor, manual_texts
 from parcontact.door.doctor import CHECKS, Bench, Check, Finding, markdown, run_check
-from parcontact.door.manual import texts
 from parcontact.errors import RunError
 from parcontact.files import run as runner
 from parcontact.files.stopping import Options
@@ -61,7 +60,7 @@ def test_verb(
 
 def test_table_of_the_manual() -> None:
     """It has every check, with what is expected of it."""
-    text = texts.page("hard_cases")
+    text = manual_texts.page("hard_cases")
     for number, check in enumerate(CHECKS, start=1):
         assert f"| {number} | {check.name} | {check.expected} |" in " ".join(text.split())
 

@@ -8,11 +8,11 @@ import pytest
 from marched_jobs import ROOT
 
 import parcontact
-from parcontact.door.manual import texts
+from parcontact.door import manual_texts
 
 HOUSE = Path(parcontact.__file__).parent
 ROOMS = {path.stem for path in HOUSE.iterdir() if not path.name.startswith("__")} | {"__main__"}
-QUOTED = set(re.findall(r"`([^`\n]+)`", texts.page("architecture")))
+QUOTED = set(re.findall(r"`([^`\n]+)`", manual_texts.page("architecture")))
 NAMES = sorted(name for name in QUOTED if re.fullmatch(r"[\w.]+", name) and name.split(".")[0] in ROOMS and "." in name)
 FILES = sorted(name for name in QUOTED if re.fullmatch(r"[\w/]+(/|\.py|\.yaml|\.md)", name))
 METHODS = ("begin", "commit", "displacement", "entries", "restored", "at_rest", "start_from")
@@ -45,4 +45,4 @@ def test_a_file(name: str) -> None:
 def test_methods_of_a_body() -> None:
     from parcontact.physics.body import ElasticBody
 
-    assert all(f"`{name}`" in texts.page("architecture") and hasattr(ElasticBody, name) for name in METHODS)
+    assert all(f"`{name}`" in manual_texts.page("architecture") and hasattr(ElasticBody, name) for name in METHODS)

@@ -24,13 +24,13 @@ import parcontact as pc
 from manual.printed import compare_lines
 from parcontact import __main__
 from parcontact.columns import TABLES
+from parcontact.door import manual_texts
 from parcontact.door.arguments import parse_arguments
-from parcontact.door.manual import texts
 from parcontact.job import schema, yaml_text
 from parcontact.march import mesh
 
-PAGES = texts.page_names()
-NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
+PAGES = manual_texts.page_names()
+NOTEBOOKS = sorted((manual_texts.PAGES.parent / "notebooks").glob("*.ipynb"))
 WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put into
     "grid": {"points": 64, "size": 1.0e-3},
     "surface": {"shape": "flat"},
@@ -44,7 +44,7 @@ OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
 
 
 def blocks(language: str, name: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", texts.page(name, WRITERS), re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```", manual_texts.page(name, WRITERS), re.MULTILINE | re.DOTALL)
 
 
 OWN_TESTS = {"effects", "many_runs"}  # pages whose Python is run elsewhere
@@ -72,24 +72,26 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_table_of_contents_has_every_page() -> None:
-    assert sorted(PAGES) == sorted({path.stem for path in texts.PAGES.glob("*.md")})
+    assert sorted(PAGES) == sorted({path.stem for path in manual_texts.PAGES.glob("*.md")})
 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_refer_to_pages(name: str) -> None:
-    assert set(re.findall(r"\{doc\}`(\w+)`", texts.page(name, WRITERS))) <= set(PAGES)
-    assert "{doc}" not in texts.plain_page(name, WRITERS)
-    assert ".. auto" not in texts.plain_page(name, WRITERS)
+    assert set(re.findall(r"\{doc\}`(\w+)`", manual_texts.page(name, WRITERS))) <= set(PAGES)
+    assert "{doc}" not in manual_texts.plain_page(name, WRITERS)
+    assert ".. auto" not in manual_texts.plain_page(name, WRITERS)
 
 
 def test_only_languages_that_are_run_or_output() -> None:
     known = {"python", "yaml", "sh", "toml", "text", "{eval-rst}"}
-    assert {word for name in PAGES for word in re.findall(r"^```(\S+)$", texts.page(name, WRITERS), re.M)} <= known
+    assert {
+        word for name in PAGES for word in re.findall(r"^```(\S+)$", manual_texts.page(name, WRITERS), re.M)
+    } <= known
 
 
 def test_the_page_on_python_is_text() -> None:
     """Calls and docstrings of what it names, with all methods of a simulation, and only some of a material."""
-    text = texts.plain_page("python", WRITERS)
+    text = manual_texts.plain_page("python", WRITERS)
     assert "## pc.Simulation(job, set=None, comm=None)\n\nA job, run from Python" in text
     assert re.search(r"^pc\.Simulation +A job, run from Python on the ranks", text, re.MULTILINE)  # in a list of names
     for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
@@ -105,7 +107,7 @@ def test_the_page_on_python_is_text() -> None:
 
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
-    written = {part: set(known) for part, known in texts.meanings().items()}
+    written = {part: set(known) for part, known in manual_texts.meanings().items()}
     assert written == {section.part.__name__: {key.word for key in section.keys} for section in schema.sections()}
 
 
@@ -120,7 +122,7 @@ def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) ->
     """As the manual prints it, for the type of the key; a section as a whole is read by the tests of blocks."""
     if word in ("path", "material", "spectrum", "heights") or (part.__name__, word) == ("Job", "surface"):
         return  # files, arrays, and sections that tests of whole jobs read
-    meaning, example = texts.meanings()[part.__name__][word]
+    meaning, example = manual_texts.meanings()[part.__name__][word]
     assert meaning.endswith(".")
     value = yaml_text.parse(f"{word}: {example}", "example").data[word]
     field = part.model_fields[word]
@@ -129,7 +131,7 @@ def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) ->
 
 
 def test_the_page_has_range_unit_and_default() -> None:
-    text = texts.page("job")
+    text = manual_texts.page("job")
     (hurst, *_) = re.findall(r"`hurst`\n: .*", text)
     assert "range: above 0 and at most 1; required" in hurst
     (keep,) = re.findall(r"`keep`\n: .*", text)
@@ -143,7 +145,7 @@ def test_the_page_has_range_unit_and_default() -> None:
 @pytest.mark.parametrize("file", TABLES)
 def test_every_table_is_on_its_page(file: str) -> None:
     """The page has a section for each table, with all of its columns."""
-    (section,) = re.findall(rf"^## {re.escape(file)}\n(.*?)(?=^## |\Z)", texts.page("outputs"), re.M | re.S)
+    (section,) = re.findall(rf"^## {re.escape(file)}\n(.*?)(?=^## |\Z)", manual_texts.page("outputs"), re.M | re.S)
     rows = re.findall(r"^\| `(\w+)` \| *([^|]*?) *\| [^|]+ \|$", section, re.M)
     assert rows == [(column.name, column.unit or "-") for column in TABLES[file]]
 
@@ -267,7 +269,7 @@ def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:
     recorded = (ROOT / "jobs" / "pictures" / "gallery" / f"{path.stem}.sha256").read_text().strip()
     data = json.dumps(yaml.safe_load(path.read_text()))
     assert recorded == hashlib.sha256(data.encode()).hexdigest()
-    assert f"gallery/{path.stem}.png" in texts.page("gallery")
+    assert f"gallery/{path.stem}.png" in manual_texts.page("gallery")
 
 
 def test_the_version_of_the_citation() -> None:
@@ -313,8 +315,8 @@ def test_files_exist() -> None:
 def test_it_names_the_pages_of_the_manual() -> None:
     (section,) = re.findall(r"^## Manual\n(.*?)^## ", README, re.M | re.S)
     lists = re.findall(r"^\* .*", section, re.M)
-    assert [name for line in lists for name in re.findall(r"`(\w+)`", line)] == texts.page_names()[1:]
-    assert set(re.findall(r"parcontact manual (\w+)`", README)) <= set(texts.page_names())
+    assert [name for line in lists for name in re.findall(r"`(\w+)`", line)] == manual_texts.page_names()[1:]
+    assert set(re.findall(r"parcontact manual (\w+)`", README)) <= set(manual_texts.page_names())
 
 
 def test_the_first_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -362,7 +364,7 @@ def test_a_road_and_a_rubber(
 
 # -- the jobs of the page "Which settings?": each runs, meets its accuracy without a warning, has the numbers ---------
 
-CASES = re.findall(r"^```yaml\n(title: .*?)^```\n(.*?)(?=^```yaml|\Z)", texts.page("settings"), re.M | re.S)
+CASES = re.findall(r"^```yaml\n(title: .*?)^```\n(.*?)(?=^```yaml|\Z)", manual_texts.page("settings"), re.M | re.S)
 
 
 def test_the_four_users() -> None:
@@ -401,25 +403,25 @@ def compare_table(text: str, path: Path) -> None:
 TABLE_LINES = re.compile(r"^\|.*\n?", re.MULTILINE)
 
 
-@pytest.mark.parametrize("name", texts.page_names())
+@pytest.mark.parametrize("name", manual_texts.page_names())
 def test_prose_is_not_wider(name: str) -> None:
-    text = texts.plain_page(name, {"verbs": lambda: ""})
-    prose = texts.CODE.sub("", text)
+    text = manual_texts.plain_page(name, {"verbs": lambda: ""})
+    prose = manual_texts.CODE.sub("", text)
     wide = [line for line in prose.splitlines() if len(line) > 80 and not line.startswith(("#", "!["))]
     assert not [line for line in wide if " " in line.strip()]
 
 
-@pytest.mark.parametrize("name", texts.page_names())
+@pytest.mark.parametrize("name", manual_texts.page_names())
 def test_no_word_is_lost(name: str) -> None:
-    text = texts.FENCE.sub("", texts.page(name, {"verbs": lambda: ""}))
-    found = texts.wrapped(text, 80)
-    assert texts.CODE.findall(found) == texts.CODE.findall(text)
+    text = manual_texts.FENCE.sub("", manual_texts.page(name, {"verbs": lambda: ""}))
+    found = manual_texts.wrapped(text, 80)
+    assert manual_texts.CODE.findall(found) == manual_texts.CODE.findall(text)
     plain = TABLE_LINES.sub("", text)
-    assert texts.wrapped(plain, 80).split() == plain.split()
+    assert manual_texts.wrapped(plain, 80).split() == plain.split()
     printed = " ".join(found.split())
-    for line in TABLE_LINES.findall(texts.CODE.sub("", text)):
-        if not texts.RULE.match(line):
-            cells = [" ".join(cell.replace(r"\|", "|").split()) for cell in texts.BAR.split(line.strip())]
+    for line in TABLE_LINES.findall(manual_texts.CODE.sub("", text)):
+        if not manual_texts.RULE.match(line):
+            cells = [" ".join(cell.replace(r"\|", "|").split()) for cell in manual_texts.BAR.split(line.strip())]
             assert [cell for cell in cells if cell not in printed] == []
 
 
@@ -427,8 +429,8 @@ def test_a_table_that_fits_has_even_columns() -> None:
     """Nineteen letters hold the widest cells and two blanks between columns; a bar in a cell is none of the table."""
     text = "| a | b | c |\n|---|---|---|\n| `x\\|y` | 1 | two three |\n"
     even = ["a      b  c", "-----  -  ---------", "`x|y`  1  two three"]
-    assert texts.wrapped(text, 19).splitlines() == even
-    assert texts.wrapped(text, 18).splitlines() != even
+    assert manual_texts.wrapped(text, 19).splitlines() == even
+    assert manual_texts.wrapped(text, 18).splitlines() != even
 
 
 def test_lists_keys_and_tables() -> None:
@@ -436,7 +438,7 @@ def test_lists_keys_and_tables() -> None:
     text = (
         "* one two three\n  four five\n\n`key`\n: what it means\n  Example: `key: 1`\n\n| a | b | c |\n|---|---|---|\n"
     )
-    assert texts.wrapped(f"{text}| row | one | two three four |\n| next | no | no |", 16).splitlines() == [
+    assert manual_texts.wrapped(f"{text}| row | one | two three four |\n| next | no | no |", 16).splitlines() == [
         "* one two three",
         "  four five",
         "",

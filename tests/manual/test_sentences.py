@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from marched_jobs import ROOT
 
-from parcontact.door.manual import texts
+from parcontact.door import manual_texts
 
 MEAN, LONGEST = 14.0, 35  # words: of all pages together, and of any sentence
 README_LONGEST = 25
@@ -36,21 +36,25 @@ def lengths(text: str) -> dict[str, int]:
     return {each: words for each, words in found.items() if words > 2}
 
 
-@pytest.mark.parametrize("name", texts.page_names())
+@pytest.mark.parametrize("name", manual_texts.page_names())
 def test_no_sentence_of_a_page_is_long(name: str) -> None:
-    found = lengths((texts.PAGES / f"{name}.md").read_text())
+    found = lengths((manual_texts.PAGES / f"{name}.md").read_text())
     assert {each: words for each, words in found.items() if words > LONGEST} == {}
 
 
-@pytest.mark.parametrize("name", texts.page_names())
+@pytest.mark.parametrize("name", manual_texts.page_names())
 def test_a_page_begins_with_what_the_reader_can_do(name: str) -> None:
     """Its first paragraph speaks to the reader; that of the first page to four of them."""
-    first = (texts.PAGES / f"{name}.md").read_text().split("\n\n")[1]
+    first = (manual_texts.PAGES / f"{name}.md").read_text().split("\n\n")[1]
     assert re.search(r"\b(you|your|You)\b", first)
 
 
 def test_the_mean_of_the_manual() -> None:
-    words = [n for name in texts.page_names() for n in lengths((texts.PAGES / f"{name}.md").read_text()).values()]
+    words = [
+        n
+        for name in manual_texts.page_names()
+        for n in lengths((manual_texts.PAGES / f"{name}.md").read_text()).values()
+    ]
     assert len(words) > 500
     assert sum(words) / len(words) <= MEAN
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from conftest import WORLD, Main
 
-from parcontact.door.manual import texts
+from parcontact.door import manual_texts
 from parcontact.job.model import Job
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
@@ -92,7 +92,7 @@ def tried(main: Main, *names: str) -> str:
 
 def rows_of_page() -> dict[str, list[str]]:
     """Return the rows of the table on the page, by the name in the first cell."""
-    table = re.search(r"(?m)^\| \| 1 \|.*\n\|-.*\n((?:\|.*\n)+)", texts.page("limits", {}))
+    table = re.search(r"(?m)^\| \| 1 \|.*\n\|-.*\n((?:\|.*\n)+)", manual_texts.page("limits", {}))
     assert table is not None, "the page has no table of pairs"
     cells = [[cell.strip() for cell in line.strip("|\n").split("|")] for line in table[1].splitlines()]
     return {re.sub(r"\W|\d", "", first): rest for first, *rest in cells}

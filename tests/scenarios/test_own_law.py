@@ -16,7 +16,7 @@ from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc
-from parcontact.door.manual import texts
+from parcontact.door import manual_texts
 from parcontact.effects import effect
 from parcontact.effects.leakage.over_time import Gaps
 from parcontact.job import Job
@@ -31,7 +31,7 @@ CELL = 1e-3 / 32
 @pytest.fixture
 def with_fluid(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """The constraint of the manual's page `effects`, in place of the usual one."""
-    (module,) = re.findall(r"```python\n(# in_fluid.py\n.*?)```", texts.page("effects"), re.S)
+    (module,) = re.findall(r"```python\n(# in_fluid.py\n.*?)```", manual_texts.page("effects"), re.S)
     names: dict[str, Any] = {}
     exec(module, names)
     assert names["FLUID"] == FLUID

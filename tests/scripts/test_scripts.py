@@ -73,6 +73,13 @@ def test_a_small_run(script: Path, tmp_path: Path, outside_mpi: dict[str, str]) 
     assert re.search(small.printed, done.stdout), done.stdout
 
 
+def test_the_settings_of_sphinx_need_no_package() -> None:
+    """Sphinx executes its settings outside of any package, in a namespace without a name."""
+    settings: dict[str, object] = {}
+    exec((ROOT_scripts / "scripts" / "sphinx_conf.py").read_text(), settings)
+    assert settings["project"] == "parcontact"
+
+
 # -- what scripts/bench.py counts and concludes; what it times is judged by nobody but its reader ---------------------
 
 

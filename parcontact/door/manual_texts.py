@@ -25,11 +25,11 @@ from typing import Any
 
 import yaml
 
-from ...columns import TABLES, describe_columns
-from ...errors import InputError
-from ...job import schema
-from ...job.parts import kind_key
-from ...job.schema import Key, SectionSchema
+from ..columns import TABLES, describe_columns
+from ..errors import InputError
+from ..job import schema
+from ..job.parts import kind_key
+from ..job.schema import Key, SectionSchema
 
 ROOM = 64  # letters for the first sentence of a docstring in the list of names
 BLOCK = re.compile(r"^```\{eval-rst\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -83,7 +83,7 @@ def _parameters(found: Any) -> str:
     return str(signature.replace(parameters=plain, return_annotation=signature.empty))
 
 
-MEANINGS = Path(__file__).parent / "keys.yaml"
+MEANINGS = Path(__file__).parent / "manual" / "keys.yaml"
 
 
 @cache
@@ -212,7 +212,7 @@ def _fill(text: str, width: int, first: str, hanging: str) -> list[str]:
     )
 
 
-PAGES = Path(__file__).parent / "pages"
+PAGES = Path(__file__).parent / "manual" / "pages"
 MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
 FENCE = re.compile(r"^:::\{toctree\}\n.*?^:::\n|^:::.*\n", re.MULTILINE | re.DOTALL)
 Writers = Mapping[str, Callable[[], str]]

@@ -1,6 +1,6 @@
 """Settings with which Sphinx builds the manual: see scripts/manual."""
 
-from ... import __version__
+from parcontact import __version__
 
 project, release, author = "parcontact", __version__, "parcontact developers"
 copyright = author

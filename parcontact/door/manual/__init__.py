@@ -1,1 +1,0 @@
-"""The manual: its pages, and their texts for a terminal."""
