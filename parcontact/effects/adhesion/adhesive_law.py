@@ -323,7 +323,7 @@ class AdhesiveLaw:
         pasts = PastGap(gap, step.position, True), last
         now = AdhesiveMemory(pasts, memory.pasts[1].gap, memory.gap_backup, memory.free_correction, trial.alpha)
         if last.known:
-            changed = self.slab.sum(float(np.count_nonzero(law.touches(last.gap) != law.touches(gap))))[0]
+            changed = self.slab.sum(float(np.count_nonzero((last.gap == 0.0) != (gap == 0.0))))[0]
         end: End = "detached" if walk.detached else "equilibrium"
         snapped, remark = walk.snapped, ""
         if walk.detached and self._goes_on_open:
@@ -337,10 +337,9 @@ class AdhesiveLaw:
             numbers["surface_energy"] = sum_gamma * trial.alpha * self.scene.energy.unit
             numbers["work_of_load"] = walk.work * self.slab.points * trial.alpha * self.scene.energy.unit
             numbers["leaves_equilibrium"] = float(walk.detached or path.closes_gap_first)
-        touching = law.touches(now.pasts[0].gap)
         pull = numbers["adhesive_force"]
         least_load = self._least_load(law, trial.alpha, control, contact.p, pull)
-        return SolvedContact(contact, now, touching, numbers, pull, least_load, end, snapped, remark)
+        return SolvedContact(contact, now, now.pasts[0].gap == 0.0, numbers, pull, least_load, end, snapped, remark)
 
     def _walk(
         self, law: Law, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, pressure: Array

@@ -55,7 +55,6 @@ import numpy as np
 from ...compiled import loop
 from ...contact import kernels
 from ...contact.certificate import LEAST_SHARE as SOLVER_LEAST_SHARE
-from ...contact.constraint import Mask
 from ...contact.problem import Approach, Control, MeanPressure, Operator
 from ...parallel.slab import Array, Slab
 from ...physics.measures import Certificate
@@ -75,11 +74,6 @@ class Law(NamedTuple):
     strength: float
     range: float
     ramp: float = 0.0
-
-    @staticmethod
-    def touches(gap: Array) -> Mask:
-        """Return a map that is True where the gap is 0: there the surfaces touch, under pressure or tension."""
-        return gap == 0.0
 
 
 @loop

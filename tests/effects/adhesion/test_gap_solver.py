@@ -164,10 +164,6 @@ def test_decay() -> None:
     assert [gap_solver.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_surfaces_touch_where_the_gap_is_closed() -> None:
-    assert Law.touches(np.array([0.0, 1e-300, 0.5])).tolist() == [True, False, False]
-
-
 @pytest.mark.parametrize("one", LAWS)
 def test_energy_and_slope_of_the_attraction(one: Law) -> None:
     """`d gamma/dg = -sigma` by central differences (second order, 1e-4 of the range), `gamma(0) = s rho`, and sigma's
