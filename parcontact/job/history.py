@@ -489,10 +489,7 @@ class Timeline:
         return self.span(number).step(number)
 
     def __iter__(self) -> Iterator[Step]:
-        return self.after(0)
-
-    def after(self, number: int) -> Iterator[Step]:
-        return (self[later] for later in range(number + 1, len(self) + 1))
+        return (self[number] for number in range(1, len(self) + 1))
 
     def span(self, number: int) -> Span:
         """Return the stage with its steps that holds the step `number`."""

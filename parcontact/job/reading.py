@@ -354,16 +354,12 @@ class Case(NamedTuple):
         return f"case {self.number}: {settings}"
 
 
-def leave_grid(source: Source, origin: Origin) -> Origin:
-    """Return `origin` and leave words such as `points: auto` in the source, where they then count as mistakes."""
-    return origin
-
-
-def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill_grid: FillGrid = leave_grid) -> Job:
+def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill_grid: FillGrid | None = None) -> Job:
     """Return the job in a job file, or in a mapping with the same keys, whose paths start at the working directory.
 
     `overrides` are texts like `grid.points=512`, or a mapping of such keys to values. `fill_grid` replaces words of the
-    grid by numbers (see `mesh.load`). Raises JobError with all mistakes.
+    grid, such as `points: auto`, by numbers (see `mesh.load`); without it these words are mistakes. Raises JobError
+    with all mistakes.
 
     For a job with a sweep `case` selects the case; raises InputError if there is none, or if none is selected.
     """
@@ -379,7 +375,7 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
     return found.job
 
 
-def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = leave_grid) -> tuple[Case, ...]:
+def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid | None = None) -> tuple[Case, ...]:
     """Return all cases of a job (one without a sweep), read as by `load`. A mistake names the first case that has
     it."""
     first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
@@ -415,7 +411,7 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
 
 
 def _read(
-    given: Given, overrides: Changes, index: int, fill_grid: FillGrid
+    given: Given, overrides: Changes, index: int, fill_grid: FillGrid | None
 ) -> tuple[Case | None, list[Mistake], Sweep | None]:
     """Return a case, or None; its mistakes; and its sweep, or None if the sweep has mistakes."""
     _refuse_no_job(given, overrides)
@@ -433,7 +429,7 @@ def _read(
     keys = [("history", index, "approach") for index in range(len(stages) if isinstance(stages, list) else 0)]
     written = tuple(str(source.locate(key).place) for key in keys)
     strict = str(source.locate(("numerics", "strict")).place)
-    origin = fill_grid(source, origin)._replace(approaches=written, strict=strict)
+    origin = (fill_grid(source, origin) if fill_grid else origin)._replace(approaches=written, strict=strict)
     try:
         job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:

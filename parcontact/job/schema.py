@@ -10,13 +10,6 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core.core_schema import (
-    AfterValidatorFunctionSchema,
-    BeforeValidatorFunctionSchema,
-    ComputedField,
-    ModelField,
-    TypedDictField,
-)
 
 from . import listing
 from .materials import Dma, Elastic, Zener
@@ -56,11 +49,11 @@ SHORT = (both, along_x, listed, expand_range)  # validators that accept one valu
 class SchemaOfKeys(GenerateJsonSchema):
     """Pydantic's generator of schemas, extended by the short forms of values."""
 
-    def field_title_should_be_set(self, schema: ModelField | TypedDictField | ComputedField | Any) -> bool:
+    def field_title_should_be_set(self, schema: Any) -> bool:
         """Return False: keys have no titles."""
         return False
 
-    def function_before_schema(self, schema: BeforeValidatorFunctionSchema) -> Schema:
+    def function_before_schema(self, schema: Any) -> Schema:
         """Return the schema of a list and its short forms: a single value, or a range of numbers."""
         found, function = self.generate_inner(schema["schema"]), schema["function"]["function"]
         if function not in SHORT:
@@ -71,7 +64,7 @@ class SchemaOfKeys(GenerateJsonSchema):
         ranges = [RANGE] if function is expand_range else [{"enum": words}] if function is both else []
         return {"anyOf": [one_value, array, *ranges]}
 
-    def function_after_schema(self, schema: AfterValidatorFunctionSchema) -> Schema:
+    def function_after_schema(self, schema: Any) -> Schema:
         """Return the schema of a number with its range; open ends become the limits of all numbers."""
         found, most = super().function_after_schema(schema), LIMITS.get(schema["function"]["function"])
         if most is None:
