@@ -45,8 +45,7 @@ from ..march.rigid_surface import highest_waves
 from ..march.scene import Scene, build_on, outline, solver_on_tiles
 from ..march.state import parts_of
 from ..march.steady import SteadySliding
-from ..parallel.slab import Slab
-from ..parallel.tally import Tally
+from ..parallel.slab import Slab, Tally
 from ..physics.convolution import SIDE, Convolution, MirroredConvolution, Tiles
 from ..physics.loops import shape_of
 

@@ -21,8 +21,7 @@ from ..job.history import Timeline
 from ..job.listing import find_effects
 from ..march.choices import choices
 from ..march.curve import request
-from ..parallel.slab import Slab
-from ..parallel.tally import Groups
+from ..parallel.slab import Groups, Slab
 from . import memory
 from .memory import Trial, try_job, warm_up
 

@@ -38,8 +38,7 @@ from ..job.advice import one_cell
 from ..job.listing import plain_job
 from ..job.reading import CASES
 from ..parallel.root import on_root
-from ..parallel.slab import Slab
-from ..parallel.tally import Groups
+from ..parallel.slab import Groups, Slab
 from ..printed import per_cent, with_error
 from ..results import compound_files, sweep_table
 from ..results.results import Results

@@ -126,7 +126,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     if not cases[0].settings:
         return act(options, cases[0].job, Slab(world, *cases[0].job.grid.points), always)
     from ..files import stopping, sweep, sweep_warnings
-    from ..parallel.tally import Groups
+    from ..parallel.slab import Groups
     from .memory import count_side_by_side
 
     on_root(world, lambda: sweep.refuse_foreign_sweep(cases))
@@ -293,8 +293,7 @@ def plan(options: argparse.Namespace) -> int:
     from itertools import chain
 
     from ..files.sweep_warnings import sentences_of
-    from ..parallel.slab import Slab
-    from ..parallel.tally import Groups
+    from ..parallel.slab import Groups, Slab
     from .memory import count_side_by_side
     from .plan import Planner
 

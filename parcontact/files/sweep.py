@@ -15,8 +15,7 @@ from ..job.listing import plain_job
 from ..job.reading import CASES
 from ..march.budget import exceeds
 from ..parallel.root import Signals
-from ..parallel.slab import Slab
-from ..parallel.tally import Groups
+from ..parallel.slab import Groups, Slab
 from ..printed import name_cases, per_cent
 from ..results import sweep_table
 from ..results.results import Results

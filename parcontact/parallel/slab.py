@@ -1,8 +1,12 @@
-"""Distribution of the rows of a map over ranks, and sums over all of them.
+"""Distribution of the rows of a map over ranks, sums over all of them, and groups of ranks for different tasks.
 
 A map has `ny` rows of `nx` points. Rows are distributed evenly and in order; x is contiguous and local. Numbers of
-ranks that do not divide `ny`, and ranks without rows, are allowed."""
+ranks that do not divide `ny`, and ranks without rows, are allowed.
 
+Operations and allocations of a run are counted; the counts do not depend on the load of the machine."""
+
+import weakref
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, TypeVar
@@ -12,10 +16,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from .fftw import pyfftw
 from .mpi import MPI
-from .tally import Ledger, Tally
 
 T = TypeVar("T")
 Array = NDArray[np.floating]
+PURPOSE = "map bytes: "  # prefix of a ledger's counts by purpose
 
 
 def deal(count: int, ranks: int) -> list[slice]:
@@ -26,6 +30,55 @@ def deal(count: int, ranks: int) -> list[slice]:
 def dealt_to(count: int, ranks: int, rank: int) -> slice:
     """Return the part of one rank, equal to its part in `deal`."""
     return slice(count * rank // ranks, count * (rank + 1) // ranks)
+
+
+class Tally(Counter[str]):
+    """Named counts of one rank, e.g. `tally["operator"]`; a name that was never counted reads 0.
+
+    Names in use: `fft` (2-D transforms, forward or backward), `fft 2048x2048 float64` (the same by size and
+    precision), `operator` (applications of a pressure -> displacement operator or its inverse), `allreduce`, `messages`
+    (with rows, to single ranks), `bytes sent` (to other ranks in transforms and moves of rows), `map bytes` (held in
+    maps and transform buffers), `map bytes at most` (their maximum), `shift` (sub-cell shifts of a surface).
+
+    If it `only_counts`, arrays take no memory (`Ledger`). Only a ledger uses the `purpose` of arrays.
+    """
+
+    only_counts = False
+    purpose = ""
+
+    def hold(self, array: NDArray[Any]) -> None:
+        """Count the bytes of an array as long as it exists."""
+        self["map bytes"] += array.nbytes
+        self["map bytes at most"] = max(self["map bytes at most"], self["map bytes"])
+        owner = array
+        while isinstance(owner.base, np.ndarray):  # views keep it alive
+            owner = owner.base
+        weakref.finalize(owner, self.subtract, {"map bytes": array.nbytes}).atexit = False
+
+    @property
+    def by_purpose(self) -> dict[str, int]:
+        """Return the bytes of all arrays of a ledger by purpose."""
+        return {name.removeprefix(PURPOSE): held for name, held in self.items() if name.startswith(PURPOSE) and held}
+
+    def since(self, earlier: Counter[str]) -> dict[str, int]:
+        """Return the counts since `earlier = tally.copy()`."""
+        return {name: count - earlier[name] for name, count in self.items() if count != earlier[name]}
+
+
+class Ledger(Tally):
+    """Counts for a plan: the calculation is not made.
+
+    Its arrays have shapes and types but neither memory nor values. Bytes are also counted by purpose.
+    """
+
+    only_counts = True
+
+    def hold(self, array: NDArray[Any]) -> None:
+        """Count the bytes of an array as long as it exists, in total and by purpose."""
+        super().hold(array)
+        name = f"{PURPOSE}{self.purpose}"
+        self[name] += array.nbytes
+        weakref.finalize(array.base, self.subtract, {name: array.nbytes}).atexit = False
 
 
 class PlannedRank:
@@ -189,3 +242,28 @@ def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """Return the memory of a contiguous array as another array that is not larger, for temporary use."""
     return np.ndarray(shape, dtype, buffer=array)
+
+
+class Groups:
+    """The ranks of `everyone` in `count` groups, at most one per rank: `number` is the group of this rank, `comm` the
+    communicator of this group. The sizes of groups differ by at most one; the constructor is collective."""
+
+    def __init__(self, everyone: MPI.Intracomm, count: int = 1) -> None:
+        self.everyone, self.count = everyone, max(1, min(count, everyone.size))
+        self.number = everyone.rank * self.count // everyone.size
+        split = everyone.Split(self.number, everyone.rank) if self.count > 1 else everyone
+        self.comm: MPI.Intracomm = split  # type: ignore[assignment]  # of an Intracomm it is one
+
+    @property
+    def root(self) -> bool:
+        """True on the single rank that decides for all groups."""
+        return self.everyone.rank == 0
+
+    def agree(self, value: T) -> T:
+        """Return the value of root on all ranks of all groups; collective."""
+        return self.everyone.bcast(value)
+
+    def from_all(self, value: T) -> list[T]:
+        """Return the value of the first rank of each group, on all ranks of all groups; collective."""
+        found = self.everyone.allgather((self.number, value))
+        return list(dict(reversed(found)).values())[::-1]

@@ -29,8 +29,7 @@ from numpy.typing import DTypeLike, NDArray
 from ..compiled import loop, pointwise
 from ..parallel.fft import FFT, Cosines
 from ..parallel.fftw import pyfftw
-from ..parallel.slab import Array, Slab, allocate, deal
-from ..parallel.tally import Tally
+from ..parallel.slab import Array, Slab, Tally, allocate, deal
 
 Symbols = list[NDArray[Any]]  # one for each block of columns
 Make = Callable[[], Symbols]

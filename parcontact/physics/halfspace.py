@@ -28,8 +28,7 @@ from numpy.typing import DTypeLike
 
 from ..errors import InputError
 from ..parallel.fft import FFT, Cosines, Spectrum
-from ..parallel.slab import Array
-from ..parallel.tally import Tally
+from ..parallel.slab import Array, Tally
 from . import love
 from .convolution import (
     ALL,

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 
 from parcontact.parallel import regrid
-from parcontact.parallel.slab import Slab, allocate, deal
-from parcontact.parallel.tally import Tally
+from parcontact.parallel.slab import Slab, Tally, allocate, deal
 
 pytestmark = pytest.mark.mpi
 

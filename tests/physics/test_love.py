@@ -12,8 +12,7 @@ from scipy.integrate import dblquad, quad
 
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
-from parcontact.parallel.slab import Slab
-from parcontact.parallel.tally import Tally
+from parcontact.parallel.slab import Slab, Tally
 from parcontact.physics import convolution
 from parcontact.physics import love as wake
 from parcontact.physics.convolution import SIDE, Tiles

@@ -15,7 +15,7 @@ from parcontact.door import plan
 from parcontact.door.plan import Planner, case_times, cases_to_try, only_steady_states
 from parcontact.job import load_cases
 from parcontact.job.listing import plain_data
-from parcontact.parallel.tally import Groups
+from parcontact.parallel.slab import Groups
 
 from .planned import CELLS, SWEEP, TWO, job
 

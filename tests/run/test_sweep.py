@@ -26,8 +26,7 @@ from parcontact.files.stopping import StopFile
 from parcontact.job import Case, Job, load_cases
 from parcontact.march.sanity import WARN_CELLS, WARN_EDGE
 from parcontact.parallel.root import Signals
-from parcontact.parallel.slab import Slab
-from parcontact.parallel.tally import Groups
+from parcontact.parallel.slab import Groups, Slab
 from parcontact.results import info, slide, sweep_table
 
 LEAVING = """
