@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .. import errors
 from ..parallel import fft
-from ..parallel.fftw import export_wisdom, import_wisdom, pyfftw
+from ..parallel.fft import export_wisdom, import_wisdom, pyfftw
 from ..parallel.slab import Slab
 from . import files
 from .provenance import processor

@@ -35,19 +35,47 @@ points first, followed by the odd ones backwards, and V the transform of these n
 
 For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
 real part and n - k as its imaginary part. So messages, blocks and memory are the same as for the transform.
+
+pyfftw is imported without its interfaces to scipy, which are imported on demand: they import half of scipy, which
+takes a fifth of a second. FFTW's choices of algorithms are its wisdom.
 """
 
+import importlib
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import groupby, pairwise
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
-from .fftw import pyfftw
 from .mpi import MPI
 from .slab import Array, Slab, allocate, deal, dealt_to, reused, without_memory
+
+INTERFACES = "pyfftw.interfaces"
+SEPARATOR = b"\x1e"  # separates the wisdom of each precision
+
+
+def _interfaces(name: str) -> ModuleType:
+    """Import the interfaces on demand."""
+    if name == "interfaces":
+        return importlib.import_module(INTERFACES)
+    raise AttributeError(f"module 'pyfftw' has no attribute {name!r}")
+
+
+if "pyfftw" in sys.modules:
+    import pyfftw
+else:
+    sys.modules[INTERFACES] = ModuleType(INTERFACES)  # a placeholder while pyfftw is imported
+    try:
+        import pyfftw
+    finally:
+        del sys.modules[INTERFACES]
+    vars(pyfftw).pop("interfaces", None)
+    vars(pyfftw)["__getattr__"] = _interfaces
+
 
 Waves = NDArray[np.complexfloating]
 LEGS = 4  # tuning: largest number of legs of an exchange
@@ -549,3 +577,15 @@ def _weigh(
             block[low, k] = half * np.conj(turn[low]) * (a - 1j * b)
             if high != low:
                 block[high, k] = half * np.conj(turn[high]) * (b - 1j * a)
+
+
+def export_wisdom() -> bytes:
+    """Return the algorithms that FFTW has chosen in this process; other algorithms would round differently."""
+    return SEPARATOR.join(pyfftw.export_wisdom())
+
+
+def import_wisdom(wisdom: bytes) -> bool:
+    """Use the algorithms of the process that exported this wisdom. Return False if FFTW does not accept it."""
+    pyfftw.forget_wisdom()
+    precisions = tuple(wisdom.split(SEPARATOR))
+    return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))

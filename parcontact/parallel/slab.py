@@ -5,6 +5,7 @@ ranks that do not divide `ny`, and ranks without rows, are allowed.
 
 Operations and allocations of a run are counted; the counts do not depend on the load of the machine."""
 
+import math
 import weakref
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -14,11 +15,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .fftw import pyfftw
 from .mpi import MPI
 
 T = TypeVar("T")
 Array = NDArray[np.floating]
+ALIGNMENT = 64  # of arrays, for SIMD and cache lines [bytes]
 PURPOSE = "map bytes: "  # prefix of a ledger's counts by purpose
 
 
@@ -229,7 +230,13 @@ class Slab:
 
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
     """Return an uninitialised array, aligned for SIMD and counted; without memory if the tally only counts."""
-    array = without_memory(shape, dtype) if tally.only_counts else pyfftw.empty_aligned(shape, dtype=dtype, n=64)
+    if tally.only_counts:
+        array = without_memory(shape, dtype)
+    else:
+        size = math.prod(shape) * np.dtype(dtype).itemsize
+        memory = np.empty(size + ALIGNMENT, np.uint8)
+        start = -memory.ctypes.data % ALIGNMENT
+        array = memory[start : start + size].view(dtype).reshape(shape)
     tally.hold(array)
     return array
 

@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop, pointwise
-from ..parallel.fft import FFT, Cosines
-from ..parallel.fftw import pyfftw
+from ..parallel.fft import FFT, Cosines, pyfftw
 from ..parallel.slab import Array, Slab, Tally, allocate, deal
 
 Symbols = list[NDArray[Any]]  # one for each block of columns

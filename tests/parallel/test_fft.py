@@ -18,8 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
 from parcontact.parallel import regrid
-from parcontact.parallel.fft import FFT, NARROWEST, Cosines
-from parcontact.parallel.fftw import export_wisdom, import_wisdom
+from parcontact.parallel.fft import FFT, NARROWEST, Cosines, export_wisdom, import_wisdom
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi

@@ -15,7 +15,7 @@ from parcontact.files.tables import read_columns
 from parcontact.march import steady
 from parcontact.march.curve import request
 from parcontact.march.loop import run_steps
-from parcontact.parallel.fftw import pyfftw
+from parcontact.parallel.fft import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.theory import full_contact
 
