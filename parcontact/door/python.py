@@ -36,9 +36,8 @@ from ..job.history import Timeline
 from ..march import curve, mesh, sanity
 from ..march.point import Point
 from ..march.scene import set_up
-from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
-from ..parallel.root import on_root
+from ..parallel.root import on_root, wait_for_all
 from ..parallel.slab import Slab
 from ..physics import prony
 from ..results.results import Results

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import parcontact as pc
-from parcontact.parallel import lockstep
+from parcontact.parallel import root
 from parcontact.parallel.root import on_root
 
 JOB: dict[str, Any] = {
@@ -87,7 +87,7 @@ def test_different_jobs_are_refused(comm: MPI.Intracomm) -> None:
 
 
 def test_ranks_in_a_row_are_stated_together() -> None:
-    assert lockstep._ranks_of(["a", "b", "b", "a"]) == "rank 0 a, ranks 1 to 2 each b, rank 3 a"
+    assert root._ranks_of(["a", "b", "b", "a"]) == "rank 0 a, ranks 1 to 2 each b, rank 3 a"
 
 
 @pytest.mark.parametrize(
