@@ -1,22 +1,47 @@
 """Capabilities: each folder of `effects/` adds one to the program, and a deleted folder removes it.
 
 The package of a folder may state `SECTION`, the section of a job that turns it on, `EFFECT`, the name of its class in
-`effect.py`, and columns (`stated`). Other folders of the program find what its further modules contain by `offers`, and
-so name no capability. `GIVES` and `USES` name quantities of a step that an effect computes for other effects, and that
-it needs from them: effects that give something act before those that use it. With `MATERIAL = True` the section is a
-material, which may include a file; with `IN_SCENE = True` all jobs of a directory have the same section.
+`effect.py`, and columns of tables (`Column`, found by `stated`). Other folders of the program find what its further
+modules contain by `offers`, and so name no capability. `GIVES` and `USES` name quantities of a step that an effect
+computes for other effects, and that it needs from them: effects that give something act before those that use it. With
+`MATERIAL = True` the section is a material, which may include a file; with `IN_SCENE = True` all jobs of a directory
+have the same section.
 `CHANGES_STEPS` names the keys that change steps which a run has completed, if these are not all keys of the section.
 `STAGE_KEYS` are the keys that a section adds to stages.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from operator import attrgetter
 from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
 
 ROOM = f"{__package__}.effects"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its name, SI unit (`""` if dimensionless), and meaning as printed in the manual.
+
+    `of` returns the value from a row (default: the attribute `name`); `when` is the section or option it requires.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    of: Callable[[Any], Any] | None = None
+    when: str = ""
+
+    def value(self, row: Any) -> Any:
+        """Return the value of this column for a row."""
+        return (self.of or attrgetter(self.name))(row)
+
+
+Table = Sequence[Column]
+COUNTED = "number of points in contact over the number of all points"  # meaning of `contact_area`
 
 
 @cache

@@ -16,8 +16,7 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from .capabilities import stated
-from .column import COUNTED, Column, Table
+from .capabilities import COUNTED, Column, Table, stated
 
 WITH_UNIT = re.compile(r"(.+?)[\s/]*(?:\[([^\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\))")  # E'[MPa], q (1/(m))
 PRIMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"

@@ -20,7 +20,7 @@ from typing import TextIO
 
 from tqdm import tqdm
 
-from ..column import Column
+from ..capabilities import Column
 from ..columns import MEASURES, cells, choose_columns, names_of, values_of
 from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget

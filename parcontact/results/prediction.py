@@ -12,7 +12,7 @@ import numpy as np
 from .. import __version__
 from .. import job as jobs
 from ..bands.choice import cut_bands
-from ..column import Table
+from ..capabilities import Table
 from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, values_of
 from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of

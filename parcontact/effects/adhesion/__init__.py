@@ -1,6 +1,6 @@
 """Adhesion: surfaces that attract each other. This module has the columns that adhesion adds to tables."""
 
-from ...column import Column, Table
+from ...capabilities import Column, Table
 
 SECTION, EFFECT = "adhesion", "AdhesionColumns"
 CHANGES_STEPS = ("adhesion.work", "adhesion.range", "adhesion.law")  # see `capabilities`

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
 
-from ...column import Column, Table
+from ...capabilities import Column, Table
 
 SECTION, EFFECT = "thermal", "ThermalColumns"
 USES = ("shear",)  # see `capabilities`

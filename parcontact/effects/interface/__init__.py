@@ -2,7 +2,7 @@
 
 from operator import attrgetter
 
-from ...column import Column, Table
+from ...capabilities import Column, Table
 
 SECTION, EFFECT = "interface", "InterfaceColumns"
 GIVES = ("shear",)  # see `capabilities`

@@ -1,6 +1,6 @@
 """Leakage through the gap of a contact, and its columns in tables."""
 
-from ...column import COUNTED, Column, Table
+from ...capabilities import COUNTED, Column, Table
 
 SECTION, EFFECT = "leakage", "LeakageColumns"
 STAGE_KEYS = ("fluid_pressures",)

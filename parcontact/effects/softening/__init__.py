@@ -1,6 +1,6 @@
 """Strain softening of filled rubber in steady sliding (the Payne effect), and its columns in tables."""
 
-from ...column import Column, Table
+from ...capabilities import Column, Table
 
 SECTION = "softening"
 EFFECT = "SofteningEffect"

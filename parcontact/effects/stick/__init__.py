@@ -1,6 +1,6 @@
 """Stick and slip: points of the contact stick until the traction reaches its bound; columns in tables."""
 
-from ...column import Column, Table
+from ...capabilities import Column, Table
 
 GIVES = ("shear",)  # see `capabilities`
 
