@@ -1,1 +1,1 @@
-"""Results of runs, curves, sweeps and studies as tables, texts, pictures and reports."""
+"""This room shows the results in output directories: as tables, texts, pictures and reports."""

@@ -1,12 +1,15 @@
 """Panels of friction curves, of bands, and of sweeps.
 
-A curve (steady.csv) is drawn against velocity, or against pressure if only pressure varies. Several temperatures are
-separate lines; against a_T v they form one master curve. Panels of bands show friction against velocity, and against
-the slip of each slide of a history, area against magnification, and quantities of effects by band. Persson's theory is
-drawn if its table exists, and steady sliding next to a history if steady.csv exists.
+A curve (steady.csv) is drawn against the velocity v, or against the pressure if only the pressure varies. Each
+temperature has its own line. With the shift factor a_T as the reduced velocity a_T v, these lines form one master
+curve, which has a panel of its own.
 
-Points of a sweep are cases, lines are their means over seeds. Each value of a second swept key has its own line and
-colour; values of further keys have dashes.
+Four kinds of panels show bands: friction against velocity; friction against the slip since the start of each slide of a
+history; contact area against magnification; and quantities of effects against the shortest wave of a band. If the table
+of Persson's theory exists, its lines are added. A history also has a line for steady sliding if steady.csv exists.
+
+Points of a sweep are cases, and lines are the means of the cases over seeds. Each value of a second swept key has its
+own line and colour. Lines of different values of further keys have different dashes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +45,8 @@ SAME = 1e-9  # rounding: of distances
 
 
 def panels_of_bands(directory: Path) -> list[Panel]:
-    """Return panels of a curve's table of bands, for its first pressure and temperature, with the theory there."""
+    """Return panels of the bands of a friction curve (bands.csv) at the first pressure and temperature in this table,
+    with the lines of the theory for the same pressure and temperature."""
     curve = Results(directory, "steady")
     if "velocity" not in curve.read(outputs.BANDS):
         return []
@@ -182,8 +186,9 @@ THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn 
 
 
 def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
-    """Return panels of a table of steady states against the axis `over`; none without states, or for an impossible
-    axis."""
+    """Return panels of a table of steady states against the velocity; against the load if `over` is "load", or by
+    default if the load alone varies. The list is empty without a state, and for `over` "time" or "distance", which
+    states do not have."""
     curve = Results(directory, "steady")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
     if over in ("time", "distance") or not columns["velocity"].size:
@@ -230,7 +235,8 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
 
 
 def steady_title(directory: Path) -> str:
-    """Return the title of a curve's picture: the job's, with the pressure or force if all points have the same."""
+    """Return the title of a curve's picture: the title of its job. If all points have one load, it follows: the force
+    on a free box, else the mean pressure."""
     curve = Results(directory, "steady")
     axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
     name = (curve.job.title if curve.job else "") or "steady sliding"

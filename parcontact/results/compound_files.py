@@ -1,9 +1,10 @@
-"""Files of fitted materials, which jobs include, with pictures; and the picture of a study.
+"""Two pictures of fits and studies, and the files of fitted materials.
 
-The picture of a material shows moduli at the reference temperature with the fit, residuals, branches and shift factors.
+A file of a fitted material is a section that jobs include. Its picture shows the moduli at the reference temperature
+with the fit, residuals, branches and shift factors.
 
-The picture of a study shows errors against the refinement of mesh and time step (as Fig. 6 of the paper), and against
-time.
+The picture of a study shows errors of results against the refinement of mesh and time step (as Fig. 6 of the paper),
+and against the computing time.
 """
 
 import math
@@ -28,7 +29,7 @@ POINTS = 400  # number of points of a line
 
 
 def refuse_foreign(target: Path) -> None:
-    """Raise InputError for an existing file that was not written by a fit."""
+    """Raise InputError for an existing file that `parcontact fit` did not write."""
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out must end in .yaml, got {str(target)!r}")
     try:
@@ -39,8 +40,9 @@ def refuse_foreign(target: Path) -> None:
 
 
 def write_compound(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
-    """Write the material file and its picture, and yield messages; `job_band` [Hz] is a job's range. Raises
-    InputError."""
+    """Write the file of a material and its picture, and yield messages: the comments of the file, both paths, and
+    warnings about the fit. `job_band` is the range of frequencies [Hz] that a job excites; a warning says if it reaches
+    beyond the measured frequencies. Raises InputError."""
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -134,8 +136,8 @@ LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
 
 @dataclass(frozen=True)
 class StudyCurve:
-    """Errors of one quantity along one `ladder` of refined `sizes` (relative to the box), and times of all steps
-    [s]."""
+    """Errors of one quantity along a `ladder`, a list of more and more refined settings. `sizes` are the sizes of their
+    cells or steps relative to the box, `seconds` the wall times of all their steps."""
 
     quantity: str
     integrator: str
@@ -154,7 +156,8 @@ class StudyCurve:
 def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
     """Draw `convergence.png` of a study and return its path; None if nothing is refined.
 
-    `doubts` are the relative uncertainties of the references; errors below them are in grey bands.
+    `doubts` has the relative uncertainty of the reference of each quantity. A grey band of the panel shows the errors
+    below it.
     """
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
     if not drawn:

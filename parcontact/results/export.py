@@ -1,7 +1,8 @@
 """Tables for finite element programs: friction by slip rate, pressure and temperature, as csv or for Abaqus.
 
-Points of a friction curve are omitted, and named, if waves of the surface excite the rubber beyond its measured
-frequencies or temperatures there. Effects export tables of runs.
+A point of a friction curve is left out if the waves of the surface excite the rubber there beyond its measured
+frequencies or temperatures. Sentences name these points. Effects may add tables of runs, such as the leakage over the
+load.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Texts about results: `parcontact info`, headlines and citations.
 
 * Descriptions of files of a run and of output directories, with checks for damage.
-* Headline of a report: a sentence with the main results of a job and their errors.
-* Comparison of a run with Persson's theory, and the settings of its predictions (theory.yaml).
+* Headlines, sentences with the main results and their errors, with which a report begins.
+* Comparison of a run with Persson's theory, and the settings of the predictions (theory.yaml).
 * References to cite for a run: this program, and the references for its job (`files.provenance`).
 """
 
@@ -37,8 +37,8 @@ NOT_HDF5 = "file signature not found"  # message of HDF5 for files of another ki
 
 
 def describe_path(path: Path) -> tuple[str, bool]:
-    """Return a description of a checkpoint, a field file or an output directory, and True if it is undamaged; on one
-    rank."""
+    """Return a description of a checkpoint, a field file or an output directory, and True if it is undamaged. Only one
+    rank may call this function."""
     if path.is_dir():
         return describe_files(path)
     try:
@@ -117,8 +117,8 @@ def _short(value: NDArray[Any]) -> str:
 
 
 def describe_files(directory: Path) -> tuple[str, bool]:
-    """Return a description of an output directory, and True if all of it is readable; raises InputError if it has no
-    results."""
+    """Return a description of an output directory, and True if all its files are readable. Raises InputError if it has
+    no results."""
     try:
         claims = outputs.read_claims(directory)
     except (OSError, ValueError) as error:
@@ -163,7 +163,7 @@ def _run(found: Results) -> Iterator[str]:
 
 
 def describe_run_in_words(run: Results) -> Iterator[str]:
-    """Yield sentences on the slide and the cycles of a run, and sentences of its effects."""
+    """Yield sentences on the slide and the cycles of a run, and the sentences of the effects of its job."""
     if (job := run.job) is not None:
         yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
         yield from slide.describe_cycles(job, slide.find_cycles(job, run.table))
@@ -456,8 +456,8 @@ def describe_settings(directory: Path) -> str:
 
 
 class ComparedResult(NamedTuple):
-    """A result [-] of the theory, the run's result (None without a run), and the error of the run's result (NaN if
-    unknown)."""
+    """A result of the theory, the same result of the run, and the error of the run's result. All are ratios [-]. `run`
+    is None without a run, `error` is NaN if it is unknown."""
 
     name: str
     theory: float
@@ -466,11 +466,12 @@ class ComparedResult(NamedTuple):
 
 
 def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[ComparedResult]:
-    """Return results of theory.csv and of measures.csv in a directory, none without theory.csv. `cell` is the spacing
-    of the grid along x [m].
+    """Return results of theory.csv and of measures.csv in a directory; an empty list without theory.csv. `cell` is the
+    spacing of the grid along x [m].
 
     Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), with the corrected area
-    for the run; without a slide, the contact area of the last instant. Raises InputError for damaged tables.
+    for the run. Without a slide, there is one result, the contact area of the last instant. Raises InputError for
+    damaged tables.
     """
     predicted, found = (_results(directory / name, history, cell) for name in (outputs.THEORY.table, outputs.RUN.table))
     nothing = None, math.nan

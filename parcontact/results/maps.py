@@ -2,7 +2,8 @@
 
 * Maps of saved instants: panels of one instant, and frames of all instants for movies and reports.
 * Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path.
-* Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder.
+* Charts of pressure, and of traction, along a line. The line is the long side of a map that is few points wide, or goes
+  through the axis of a sphere or cylinder.
 """
 
 import io
@@ -40,7 +41,8 @@ PRESSURE, TRACTION = Axis("pressure", "Pa"), Axis("traction", "Pa")
 
 
 def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[Panel]:
-    """Yield the panel of pressure along a line, for a narrow map, or for a surface that is a single round shape."""
+    """Yield the panel of pressure along a line. There is one if the map is `narrow` (few points wide), or if the
+    surface is a single sphere or cylinder; else nothing is yielded."""
     shape = run.job.surface[0]
     if narrow:
         yield _make_strip(run, fields)
@@ -168,11 +170,11 @@ BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which po
 
 
 def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[Panel]], list[Panel]]:
-    """Return groups of panels of pressures (on a line, and wide maps), and panels of the other saved maps, or of
-    tractions on a line, all at one instant.
+    """Return two lists of panels at one instant: groups of panels below each other (pressures on a line, and each map
+    that is wide), and the panels of all other saved maps, or of tractions on a line.
 
-    The default instant is the last one; for contacts that end in detachment, the instant of the pull-off or of the
-    largest load. Raises InputError if nothing is saved at the instant `at`.
+    The instant `at` is a step or a time [s]. By default it is the last saved instant up to the row that shows the
+    contact best (`Results.telling_row`). Raises InputError if nothing is saved at `at`.
     """
     try:
         with run.open_maps() as file:
@@ -215,10 +217,11 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
 
 
 def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
-    """Return a map for drawing, NaN at points without a value.
+    """Return the `values` of the map called `name` for drawing, NaN at points that are not drawn.
 
-    Pressures are drawn where they are positive, with adhesion everywhere; gaps outside of contact, or where they are
-    positive if there are no pressures; the pressure of a fluid outside of contact.
+    Pressures are drawn where they are positive; if adhesion makes some negative, they are drawn everywhere. Gaps are
+    drawn outside of contact, or where they are positive if pressures are not given. The pressure of a fluid is drawn
+    outside of contact.
     """
     if name == "pressure":
         return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
@@ -231,9 +234,11 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
 
 
 def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
-    """Return a map of |traction| where there is pressure, and of its ratio to the bound, which is 1 where points slip.
+    """Return a map of |traction| where there is pressure, and a map of its ratio to the bound, which is 1 where points
+    slip.
 
-    The bound is the coefficient times the pressure, or for a shear strength the largest traction.
+    With a coefficient of friction the bound is this coefficient times the pressure. With a shear strength it is the
+    largest traction in the map.
     """
     touching, coefficient = pressure > 0.0, job.section("interface").coefficient
     bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
@@ -295,7 +300,8 @@ def _along(values: Array) -> Array:
 
 
 def dataset_of(file: h5py.File, name: str) -> str:
-    """Return the name of a map's data set in a file, '' if there is none; temperatures may have two names."""
+    """Return the name of the data set with a map in a file, '' if there is none. The map of a quantity that is also a
+    column, such as the temperature, is called `temperature_map`."""
     return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
 
 
@@ -313,8 +319,9 @@ def draw_frames(
     size: tuple[float, float] = (4.5, 4.0),
     dpi: int = 110,
 ) -> Iterator[Image.Image]:
-    """Draw a saved map of shape (instant, y, x) at each index in `labels`, with one colour scale. Only the map and its
-    title are drawn anew for each frame."""
+    """Draw a saved map of shape (instant, y, x) at each index in `labels`, which has the text of each title, and yield
+    the images. All have one colour scale, and the `size` [inch] with `dpi` points per inch. Only the map and its title
+    are drawn anew for each frame."""
 
     def read(index: int) -> Array:
         if name in STICK_MAPS:

@@ -1,9 +1,11 @@
 """`parcontact report`: the page, its chapters, and sections on the job.
 
-* The HTML page of a report, which loads no other files.
-* Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study.
-* Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine.
-* Sections on errors and costs, program, machine and runs, and references to cite; on the rigid surface and material.
+* The page is one HTML file, which loads no other files.
+* Each output directory with a run, a friction curve, a sweep or a study has a chapter. Several directories have another
+  chapter that compares them.
+* The sections of a chapter show the job, its rigid surface and its material; errors and costs; warnings; the program,
+  the machine and the runs; and references to cite. Warnings, estimated errors and counts are read from run.log and
+  steady.log.
 """
 
 import json
@@ -57,7 +59,8 @@ BEYOND = "; more than the "  # in an estimate that exceeds numerics.accuracy
 
 @dataclass(frozen=True)
 class Log:
-    """Contents of a log: all different warnings in order; sentences on errors, and counts, of the last run; lines on
+    """Contents of the logs of a directory. `warnings` has each warning once, in order. `estimates` are sentences on
+    errors and `counts` are pairs of an operation and its number, both of the last run. `machine` has the lines on
     program and machine."""
 
     warnings: list[str]
@@ -78,8 +81,8 @@ def read_logs(directory: Path) -> Log:
 
 
 def warnings_of_cases(directory: Path) -> list[str]:
-    """Return the warnings in the logs of a sweep's cases, and the errors that exceed numerics.accuracy, each once with
-    its cases."""
+    """Return the warnings in the logs of a sweep's cases, and sentences on errors that exceed numerics.accuracy. Each
+    sentence appears once, with the numbers of its cases."""
     found: dict[str, list[int]] = {}
     for path in sorted(directory.glob(f"{CASES}/*")):
         if path.name.isdecimal():
@@ -110,9 +113,9 @@ def costs(results: Results, found: Log, job: Job) -> Iterator[ReportSection]:
 
 
 def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job, of_curve: bool) -> ReportSection:
-    """Return the section on the errors of a friction curve at its worst and best point, or of a run at its end, with
-    the sentences of its log. Friction is left out if nothing slides. The section is empty for a table without
-    errors."""
+    """Return the section on estimated errors: those of a friction curve at its worst and its best point, those of a run
+    in its last row with a known error, and the sentences of the log. Friction is left out if nothing slides. The
+    section is empty for a table without errors."""
     rows = []
     for column, name, asked in zip(ERRORS, ("friction", "contact area"), job.numerics.asked.both, strict=True):
         known = [error for error in columns.get(column, ()) if error == error]
@@ -125,7 +128,8 @@ def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job
 
 
 def origin_section(directory: Path, found: Log) -> ReportSection:
-    """Return the section on provenance, from the newest file of a directory that states it."""
+    """Return the section on the provenance of results: program, machine and runs. It is read from the newest file of a
+    directory that has these attributes."""
     there = [directory / name for name in outputs.MAPS if (directory / name).is_file()]
     there += [path for _, path in outputs.find_checkpoints(directory)]
     for path in there:
@@ -159,8 +163,8 @@ MOST_POINTS = 2**22  # most points of a surface that is computed for a report
 
 
 def road_section(job: Job) -> ReportSection:
-    """Return the section on the surface of a job, computed again; only its keys if its files are gone or it is too
-    large."""
+    """Return the section on the surface of a job, which is computed again. If the files of the job are gone, or the
+    surface is too large, the section only has the keys of the shapes."""
     lines = [(listing.listed_line(part),) for part in job.surface]
     shapes = ReportTable(("shape",), lines, "shapes, whose heights add up")
     if job.bands is not None:

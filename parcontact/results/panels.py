@@ -1,6 +1,7 @@
 """Panels of pictures: what they contain, and how they are drawn.
 
-A picture is a list of panels, which `draw` draws: lines with errors, stacks of bars, shaded ranges, a map.
+A picture is a list of panels. A panel contains lines with bars of their errors, stacks of bars, shaded ranges of its
+axes, or a map. `draw` draws it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,9 +37,10 @@ TICKS = 5  # most intervals of ticks of a bar of colours
 
 @dataclass(frozen=True)
 class Line:
-    """A line, or bars, of a panel: name (or ''), values in SI units, and their relative errors if known.
+    """A line, or bars, of a panel: its name ('' if it has no entry in the legend), values `x` and `y` in SI units, and
+    relative errors of y if they are known.
 
-    Bars stand on the bars before them with the same `stack` number.
+    Lines with the same number `stack` are bars, which stand on each other in their order.
     """
 
     name: str
@@ -64,7 +66,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class ColumnPanel:
-    """A panel of a table before its rows and horizontal axis are chosen: `columns` by the names of their lines."""
+    """A panel of columns of a table whose rows and horizontal axis are not chosen yet. `columns` has the name of each
+    column by the name of its line."""
 
     key: str
     y: Axis
@@ -72,7 +75,8 @@ class ColumnPanel:
 
 
 def offered(name: str) -> list[ColumnPanel]:
-    """Return the panels of columns that effects add under a `name`: RUN_PANELS, CURVE_PANELS, ..."""
+    """Return the panels of columns that effects offer in the constant `name` of their pictures: RUN_PANELS,
+    CURVE_PANELS, BAND_PANELS or SWEEP_PANELS."""
     return [one for found in answers("pictures", name) for one in found]
 
 
@@ -90,9 +94,12 @@ class Shade:
 
 @dataclass(frozen=True)
 class Colors:
-    """A map of `values`, shape (ny, nx), between the `ends` x0, x1, y0, y1 [m] of its box, in colours from `low` to
-    `high`; if `low` exceeds `high`, there is no colour bar. Points without a value, NaN, are `blank`, or have the grey
-    shade of the map `behind`. `clipped`: higher values have the last colour."""
+    """A map of `values`, shape (ny, nx), on the box with the `ends` x0, x1, y0, y1 [m], in colours from the value `low`
+    to the value `high`. A map in which no point has a value has low > high, and gets no colour bar.
+
+    Points without a value are NaN. They have the colour `blank`, or with a map `behind` the grey shade of this map. If
+    values above `high` exist, `clipped` is True; they get the last colour.
+    """
 
     values: Array
     ends: tuple[float, float, float, float]
@@ -108,12 +115,13 @@ class Colors:
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel of a picture, chosen by its `key`: lines `series` against the axis `x`, on a map of `colors` if there is
-    one.
+    """A panel of a picture: the lines `series` against the axis `x`, on a map `colors` if it has one. Options of a
+    picture choose panels by their `key`.
 
-    `spikes`: a spike at the beginning may be cut off. `peak`: the legend names the highest point. `zeros`: label of
-    values of 0 on a logarithmic axis. `edges` [m] are the wavelengths between the bands of stacked bars, from the
-    longest down, for a colour bar. `x_range` and `y_range` are limits of the axes.
+    If `spikes` is True, the vertical axis may end below a spike at the beginning, whose height is then printed. If
+    `peak` is True, the legend names the highest point. On a logarithmic axis, values of 0 are marked with the label
+    `zeros`. `edges` are the wavelengths [m] between the bands of stacked bars, from the longest down, for a bar of
+    their colours. `x_range` and `y_range` are limits of the axes.
     """
 
     key: str
@@ -135,7 +143,8 @@ class Panel:
 
 
 def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a panel without its legend. `log` names logarithmic axes, which are linear without positive points."""
+    """Draw a panel without its legend. `log` names the axes to be logarithmic ("x", "y", or "none" for neither). An
+    axis without positive points is drawn linear."""
     log_x = "none" not in log and (panel.log_x or "x" in log)
     log_y = "none" not in log and bool(panel.log_y or panel.zeros or "y" in log)
     series = [_drop_hidden_points(one, log_x, log_y) for one in panel.series]
@@ -194,7 +203,7 @@ def _draw_shades(axes: Axes, shades: Sequence[Shade]) -> None:
 
 
 def show_colors(axes: Axes, one: Colors) -> AxesImage:
-    """Draw a map with its colour bar. The scale of a single value has one tick."""
+    """Draw a map with its colour bar. If all points have the same value, the bar has one tick."""
     axes.set_facecolor(one.blank)
     axes.grid(False)
     if one.behind is not None:
@@ -339,6 +348,7 @@ def _name_peak(axes: Axes, one: Line, unit: str) -> None:
 def picture(
     title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Panel] = (), log: Sequence[str] = ()
 ) -> Figure:
-    """Return a picture with groups of panels below each other, then `maps`, all of one size."""
+    """Return a picture with groups of panels below each other, and below them the panels `maps`, which are all of one
+    size."""
     drawn = [[partial(draw, panel, log=log) for panel in group] for group in (*groups, maps)]
     return style.figure_of(title, drawn[:-1], drawn[-1])

@@ -1,7 +1,8 @@
 """Pictures of runs, also unfinished ones, and of friction curves: panels, and maps of one instant.
 
-The job determines the panels: friction if the surface slides, energies if they were requested, curves against the load
-if all stages are single solves, and for a sphere pressures along a line with Hertz's solution.
+The job determines the panels. There is friction if the surface slides, and there are energies if they were requested.
+Curves are drawn against the load if no stage has a duration. For a sphere, pressures along a line are drawn with
+Hertz's solution.
 """
 
 import itertools
@@ -31,9 +32,10 @@ FAILED_CASES = 3  # most failed cases that a picture names
 
 @dataclass(frozen=True)
 class PlotOptions:
-    """Options of a picture. Options that are '' or () are chosen by the contents of the directories.
+    """Options of a picture, named as those of `parcontact plot`. Options that are '' or () are chosen by the contents
+    of the directories.
 
-    `out` is a file, `at` a step or a time [s] of the maps.
+    `at` chooses the saved maps after a step (a whole number) or near a time [s]; `out` is the file of the picture.
     """
 
     format: str = ""
@@ -209,10 +211,11 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
-    """Return the panels that at least `least` of several runs have, with the lines of all runs.
+    """Return the panels that several runs have in common, with the lines of all runs; `least` is the number of runs
+    that must have a panel.
 
-    Each run has one colour; its lines have marks, and bands are shares of its bar. If no run has several lines in a
-    panel, each run has dashes instead.
+    Each run has one colour. Lines of one run are distinguished by marks, and bars of one run by shades of its colour.
+    If no run has several lines in a panel, runs are distinguished by colour and dashes.
     """
     found: dict[tuple[str, Axis, Axis], list[tuple[int, Panel]]] = {}
     for number, (_, panels) in enumerate(runs):

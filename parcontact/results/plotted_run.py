@@ -62,7 +62,7 @@ class PlottedRun(Results):
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        """Return the axis and the values of the contact area, corrected for cells at its edges."""
+        """Return the axis and the values of the contact area with the correction at the edges of contact."""
         return to_contact_area(self.columns["contact_area_corrected"], self.area * self.free)
 
     @property
@@ -75,7 +75,7 @@ class PlottedRun(Results):
 
     @property
     def curves(self) -> bool:
-        """Return True if there is more than one solve, so that curves can be drawn."""
+        """Return True if time passes or the load changes, so that curves can be drawn."""
         return bool(self.lasts) or len(set(self.columns["pressure"])) > 1
 
     @cached_property
@@ -86,8 +86,7 @@ class PlottedRun(Results):
 
     @property
     def telling_step(self) -> int:
-        """Return the step whose maps show the contact best: the last one, or after a detachment the step of the
-        pull-off or of the largest load."""
+        """Return the step of the row that shows the contact best (`Results.telling_row`)."""
         return int(self._all["step"][self.telling_row])
 
     @property
@@ -126,15 +125,17 @@ class PlottedRun(Results):
         return "" if name == f"stage {stage + 1}" else name
 
     def moved(self, step: int) -> tuple[float, float]:
-        """Return the position of the surface after a step [m]; the initial position for a step that the job lacks."""
+        """Return the position of the surface after a step [m]. It is (0, 0) for step 0, and for a map of a step that is
+        no longer in the stored job."""
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
 class Fields(SavedMaps):
-    """The saved maps of a run: `shown` are the instants to draw, `chosen` is the one whose maps are drawn (default: the
-    last).
+    """The saved maps of a run. `shown` are the indices of the instants that pictures over several instants may show.
+    `chosen` is the index of the one instant whose maps are drawn, by default the last.
 
-    `at` is a step (a whole number), whose maps must be saved, or a time [s], for which the nearest maps are taken.
+    The text `at` restricts both to one instant. It is a step (a whole number), whose maps must be saved, or a time [s],
+    for which the nearest maps are taken. With `until`, `chosen` is the last instant up to this step.
     """
 
     def __init__(self, file: h5py.File, at: str = "", until: int | None = None) -> None:
@@ -199,7 +200,8 @@ def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
 
 
 def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
-    """Return axis and values of the contact: its area for a free box of this `area` [m^2], else its nominal share."""
+    """Return axis and values of the contact area: in m^2 for a free box of this `area` [m^2], else over the nominal
+    area."""
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)
 
 
@@ -225,8 +227,9 @@ VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an 
 
 @dataclass(frozen=True)
 class Abscissa:
-    """The horizontal axis of a run's panels: SI `values` of all or some `rows`, `shades` of stages, and whether rows
-    are `marked`. `loop` is True if values return, as loads and approaches do."""
+    """The horizontal axis of a run's panels, with SI `values` in some `rows` of the run (None: all rows). `shades` are
+    the ranges of its stages. Points have marks if `marked` is True. `loop` is True for loads and approaches, which may
+    return to earlier values."""
 
     axis: Axis
     values: Array
@@ -236,7 +239,8 @@ class Abscissa:
     loop: bool = False
 
     def series(self, lines: dict[str, Array]) -> list[Line]:
-        """Return lines for the given arrays, with their names; a single line gets no name."""
+        """Return the lines of columns of the run, given by the names of the lines. A line called '' has no entry in the
+        legend."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows
@@ -346,7 +350,7 @@ def _shown(run: PlottedRun, along: Abscissa, load_axis: Axis, columns: Mapping[s
 
 
 def describe_solve(run: PlottedRun) -> str:
-    """Return the results of the last solve as text."""
+    """Return the results of the last row of a run as text."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
     area = printed.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"

@@ -48,7 +48,8 @@ WavesOf = Literal["continuum", "lattice"]
 
 
 class PredictedInstant(NamedTuple):
-    """One row of theory.csv [s, m, Pa, -, -]."""
+    """One row of theory.csv: time [s], distance slid [m], mean pressure [Pa], friction coefficient and share in
+    contact."""
 
     time: float
     distance: float
@@ -58,11 +59,13 @@ class PredictedInstant(NamedTuple):
 
 
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[PredictedInstant]:
-    """Yield the predictions for a job, one for each instant, the initial state first; `slab` must have one rank.
+    """Yield the predictions for a job, one for each instant, the initial state first. `gamma` corrects the friction in
+    partial contact (`theory.persson`). The grid must be on one rank, whose `slab` is given.
 
-    The waves represent the job's spectrum on an unbounded surface (`continuum`), or its heights in the box (`lattice`).
-    For stages that choose their steps, instants are the steps of the run in the job's directory; before a run, steps
-    double up to one cell (`job.history`). Raises InputError for jobs outside the theory.
+    If `waves` is "continuum", the waves represent the spectrum of the job's surface without a box. If it is "lattice",
+    they are the waves of the heights in the box. For stages that choose their steps, instants are the steps of the run
+    in the job's directory; before a run, steps double up to one cell (`job.history`). Raises InputError for jobs
+    outside the theory.
     """
     _refuse_unknown(job)
     timeline = Timeline.from_job(job).follow(_times_of_run(job))
@@ -85,7 +88,8 @@ def _times_of_run(job: Job) -> dict[int, float]:
 
 
 class SteadyInstant(NamedTuple):
-    """One row of steady_theory.csv [m/s, Pa, deg C (NaN: the job's temperature), -, -, -]."""
+    """One row of steady_theory.csv: velocity [m/s], mean pressure [Pa], temperature [deg C], shift factor, friction
+    coefficient and share in contact. The temperature is NaN if the curve is solved at that of the job."""
 
     velocity: float
     pressure: float
@@ -96,7 +100,8 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Return True if the theory applies to a job and does not need its heights: in bands, or with one rough surface."""
+    """Return True if the theory applies to a job and does not need its heights. Such a job has one isotropic rough
+    surface, or is solved in bands of a spectrum."""
     if _why_forbidden(job):
         return False
     if job.bands is not None:
@@ -130,8 +135,9 @@ def predict_steady(
 
 
 class BandInstant(NamedTuple):
-    """One row of bands_theory.csv [m/s, Pa, deg C (NaN: the job's temperature)]: number of the band, wavelengths [m],
-    friction of the band's waves, and the share in contact at its shortest wave."""
+    """One row of bands_theory.csv: velocity [m/s], mean pressure [Pa], temperature [deg C] (NaN: that of the job),
+    number of the band, its longest and shortest wavelength [m], the friction of its waves, and the share in contact
+    with all waves down to its shortest."""
 
     velocity: float
     pressure: float
@@ -144,7 +150,8 @@ class BandInstant(NamedTuple):
 
 
 def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
-    """Yield friction and area of each band of a job: friction is the increment by the band's waves."""
+    """Yield friction and contact area of each band of a job. The friction of a band is the friction with all waves down
+    to its shortest, minus the friction without its waves."""
     cut = cut_bands(job)
     rows = dict[Wanted, list[SteadyInstant]]()
     for number in range(cut.count):
@@ -158,7 +165,8 @@ def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
 
 
 def write_steady(job: Job, wanted: Request) -> SteadyInstant:
-    """Write the predictions of a friction curve to steady_theory.csv. Return the point of the highest friction."""
+    """Write the predictions of a friction curve to steady_theory.csv, and of its bands to bands_theory.csv. Return the
+    prediction with the highest friction."""
     rows = list(predict_steady(job, wanted))
     if job.bands is not None:
         _write(job.output.directory / outputs.BANDS_THEORY, BANDS_THEORY, predict_bands(job, wanted))
@@ -176,8 +184,8 @@ def draw_curve(job: Job, wanted: Request) -> Path:
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
-    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences that compare
-    the predictions with the job's run if there is one."""
+    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences, which
+    compare the predictions with the run of the job if it exists."""
     files.refuse_pipes(job.output.directory)
     settings = TheorySettings(gamma, waves)
     if not job.history:
@@ -301,7 +309,8 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
 
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
-    """Return the rings of a measured spectrum, without waves longer than the box or shorter than two cells."""
+    """Return the waves of a measured spectrum in rings of equal wavenumber (`persson.Rings`), without waves longer than
+    the box or shorter than two cells. `slide` is the largest distance [m] between two positions of the surface."""
     from ..job import measured_maps
 
     found, (long, short) = measured_maps.read_spectrum(part)

@@ -1,8 +1,11 @@
-"""Parts of a report, and its sections on results: of a run, a friction curve, a sweep or a study, with their maps.
+"""Parts of a report, and its sections on results.
 
-* Parts are texts, tables, pictures, browsers of maps and data, all stored in the page.
-* Tables show friction by speed and temperature for each pressure, of one curve or of several side by side, and the
-  important lengths, frequencies and moduli.
+* Parts of a section are sentences, tables, pictures, browsers (which step through the pictures of a map), and
+  downloads. All are stored in the page.
+* Sections show the results of a run, a friction curve, a sweep or a study; a run and a curve also have their saved
+  maps.
+* Tables of curves show friction by speed and temperature for each pressure, of one curve or of several side by side,
+  and the important lengths, frequencies and moduli.
 """
 
 import base64
@@ -69,7 +72,8 @@ class ReportSection:
         return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
 
     def without(self, places: Sequence[str]) -> "ReportSection":
-        """Return the section with the directories `places` removed from paths in its sentences and tables."""
+        """Return the section with the directories `places` removed from the paths in its sentences and tables, so that
+        a report does not show the directories of this machine."""
 
         def shorten(text: str) -> str:
             for place in places:
@@ -92,7 +96,7 @@ class Chapter:
 
 
 def draw_panel(panel: Panel, caption: str = "") -> Picture:
-    """Return a picture of one panel, as SVG; its caption names its axes by default."""
+    """Return a picture of one panel, as SVG. By default the caption of the picture names the axes of the panel."""
     file = io.BytesIO()
     with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
@@ -137,7 +141,8 @@ def friction_tables(curve: Results) -> list[ReportTable]:
 
 
 def compared_table(directories: Sequence[Path], names: Sequence[str]) -> list[ReportTable]:
-    """Return a table with the friction of several curves at points that two or more have; an empty list without any."""
+    """Return a list with one table of the friction of several curves, called `names`, at the points that two or more
+    curves have; an empty list if there is no such point."""
     each = [_cells(Results(one, "steady")) if Results(one).has(outputs.STEADY.table) else {} for one in directories]
     places = sorted({place for cells in each for place in cells}, key=_order)
     shared = [place for place in places if sum(place in cells for cells in each) > 1]
@@ -276,8 +281,8 @@ def describe_curve(directory: Path) -> ReportSection:
 
 
 def describe_friction(directory: Path) -> ReportSection:
-    """Return the first section on a friction curve: friction by speed and temperature, unsolved points and why, and the
-    lengths, frequencies and moduli that matter."""
+    """Return the section that begins the chapter on a friction curve: friction by speed and temperature, points that
+    are not solved with the reasons, and the lengths, frequencies and moduli that matter."""
     curve = Results(directory, "steady")
     sentences = [f"The curve has {curve.lost}."] if curve.lost else []
     sentences += [f"{text[:1].upper()}{text[1:]}." for text in curve.unfinished if text != curve.lost]

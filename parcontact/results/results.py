@@ -47,7 +47,8 @@ Rows = list[dict[str, Any]]
 
 
 class ResultTable(Columns):
-    """Columns of a table by name; access to a missing column raises InputError."""
+    """A table of results, as lists of values by the names of the columns. Reading a missing column raises
+    InputError."""
 
     @property
     def units(self) -> dict[str, str]:
@@ -63,10 +64,11 @@ class ResultTable(Columns):
 
 
 class Results:
-    """Results in a directory, of a `kind`: run, steady, sweep, study or theory; by default the first kind that exists.
+    """Results in a directory. `kind` is run, steady, sweep, study or theory; by default it is the first of these that
+    exists.
 
-    A given `job`, and a text on how the surfaces `detached`, replace what is stored. Tables, maps and job are read when
-    they are used, and raise InputError if they are damaged.
+    A `job` that is given replaces the stored job. A text `detached` on how the surfaces detached replaces the stored
+    text. Tables, maps and job are read when they are used, and raise InputError if they are damaged.
     """
 
     def __init__(self, path: str | Path, kind: str = "", job: Job | None = None, detached: str = "") -> None:
@@ -85,7 +87,7 @@ class Results:
 
     @cached_property
     def table(self) -> ResultTable:
-        """Table of the results of this kind, with units; of a sweep, the columns that are numbers."""
+        """Table of the results of this kind, with units. For a sweep, it has only the columns of numbers."""
         if self.kind != "sweep":
             return self.read(outputs.BY_VERB[self.kind].table)
         rows = self.cases
@@ -113,7 +115,7 @@ class Results:
 
     @property
     def title(self) -> str:
-        """Title of the job; a text that says so if it has none."""
+        """Title of the job; "without a job" or "without a title" if there is none."""
         if (path := self.job_file) is None:
             return "without a job"
         found = re.search(r"^title: (.+)$", path.read_text(errors="replace"), re.MULTILINE)
@@ -147,13 +149,13 @@ class Results:
 
     @cached_property
     def detached(self) -> str:
-        """Text on how the surfaces of a run detached for good; '' if they did not."""
+        """Text on how the surfaces of a run detached without a way back; '' if they did not."""
         return self._detached or outputs.detached(self.path)
 
     @property
     def telling_row(self) -> int:
-        """Row that shows the contact of a run best: the last one; after a detachment the row that an effect names, else
-        the last row of the largest load."""
+        """Row that shows the contact of a run best. It is the last row, unless contact is lost there. Then an effect
+        may name a row, such as adhesion that of the pull-off; else it is the last row of the largest load."""
         pressure, area = (np.asarray(self.table[name], float) for name in ("pressure", "contact_area"))
         if area[-1] > 0.0 and not self.detached:
             return len(area) - 1
@@ -172,7 +174,8 @@ class Results:
 
     @property
     def points(self) -> Path:
-        """Path of the table with the results of a sweep: of its cases, or of the points of its curves."""
+        """Path of the table that has the results of a sweep: sweep.csv with a row for each case, or for friction curves
+        sweep_curves.csv with a row for each point."""
         known = any(math.isfinite(row.get("residual", math.nan)) for row in self.cases)
         curves = self.has(outputs.SWEPT_CURVES) and not known
         return self.path / (outputs.SWEPT_CURVES if curves else outputs.SWEEP.table)
@@ -216,7 +219,8 @@ class Results:
                 yield f"{count} of {len(asked)} points are not solved yet"
 
     def failed_cases(self, most: int = 10**9) -> list[str]:
-        """Return sentences on at most `most` failed cases of a sweep, and a sentence on the number of further ones."""
+        """Return sentences on the failed cases of a sweep, at most `most`, and a sentence on the number of further
+        ones."""
         failed = [int(row["case"]) for row in self.cases if row["state"] == "failed"]
         found = [": ".join(filter(None, (f"case {one} failed", self._why_failed(one)))) for one in failed[:most]]
         return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
@@ -278,7 +282,8 @@ class Results:
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """Columns of a run along `step`, with the coordinate `time` [s], and the saved maps."""
+        """Return the columns of a run as arrays over the coordinate `step`, with `time` [s] as a further coordinate,
+        and the saved maps."""
         maps, known = self.maps, {column.name for column in MEASURES}
         given = self.table.units.items()
         units = {name: {"units": unit or "1"} if unit or name in known else {} for name, unit in given}
@@ -320,8 +325,9 @@ class Results:
 
 
 def describe_end(best: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
-    """Return a text: friction still rises at the end of the values of a key. '' unless the row `best` of the highest
-    friction is at the end of at least three values."""
+    """Return a text which says that friction still rises at the end of the range of some `keys`, else ''. A key is
+    named if at least three of its values occur in `rows`, and the row `best` with the highest friction has the lowest
+    or highest one."""
     found = dict[str, None]()
     for key in keys:
         values = sorted({row[key] for row in rows if isinstance(row[key], float) and row[key] == row[key]})
@@ -364,7 +370,8 @@ def swept_keys(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 class ExportedTable(NamedTuple):
-    """A table for other programs: stem of its file name, columns with units, rows, and sentences on what it lacks."""
+    """A table for other programs: stem of its file name, columns with units, rows, and sentences on what the table
+    lacks."""
 
     name: str
     head: Sequence[str]

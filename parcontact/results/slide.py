@@ -1,33 +1,36 @@
 """Results of the slide of a run, and of the cycles of its stages that oscillate, from the rows of measures.csv.
 
-The slide of a history is its last part at one non-zero velocity under one load: the last stage that slides, with those
-before it that have the same velocity and the same constant load. As in the paper (Sec. 3.1), mu_max is the highest
-friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady sliding may need a
-longer slide (`parcontact steady` solves it directly). Rows in which the contact reaches the edge of the box do not
-count. The slide is then incomplete, so that no errors are known.
+The slide of a history is its last part at one non-zero velocity under one load. It consists of the last stage that
+slides, and of the stages just before it with the same velocity and the same constant load. As in the paper (Sec. 3.1),
+mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Friction
+may need a longer slide to become steady (`parcontact steady` solves steady sliding directly). Rows in which the contact
+reaches the edge of the box do not count. A slide with such rows is incomplete, so that its errors are not known.
 
 Cycles have a loss, amplitudes and a phase, in the table cycles.csv. If a load or an approach oscillates, the force F is
-the normal force and s the approach; if a velocity oscillates, F is the tangential force and s the position of the
+the normal force and s the approach. If a velocity oscillates, F is the tangential force and s the position of the
 surface. The loss of a cycle is the area of its loop,
 
     W = int (F - <F>) ds,
 
-with <F> the mean force over the cycle, as creep under the mean force is no part of the loop. A cycle that repeats the
-last one dissipates W. `phase` is the angle [rad] by which the first harmonic of s lags behind that of F: 0 for an
-elastic body.
+where <F> is the mean force over the cycle: without it, creep under the mean force would count as a loss. A cycle that
+repeats the one before dissipates W. `phase` is the angle [rad] by which the first harmonic of s lags behind that of F.
+It is 0 for an elastic body.
 
-Where nothing moves along the surface, int F ds is the change of `work`, if energies are saved. Otherwise F and s are
-Hermite's cubics between two rows, with slopes by differences, at most STEEP times the smaller slope of both steps. The
-error of W has up to five parts:
+Where nothing moves along the surface, int F ds is the change of the column `work`, if the run saves energies
+(`output.energy`). Otherwise F and s are interpolated by Hermite's cubics between two rows. Their slopes are
+differences, limited to STEEP times the smaller slope of both steps, so that a cubic stays between its ends. The error
+of W is a sum of up to five parts:
 
-* by this interpolation: the difference to interpolation over pairs of steps, divided by its order of at least three;
-* by jumps of F, steps STEEP times as steep as both neighbours: half the product of both changes, as the jump may be
-  anywhere in its step; by interpolation the same for two steps on each side, where F turns like a root;
-* if something slides, the error of friction, weighted with the force;
-* else by the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`), times
-  HARMONICS;
-* by the solver, as for the area (`march.budget`), divided by the root of the number of steps, and by sin phase, as the
-  loop is the small difference of two paths; and by the mesh, MESH of the error of the area.
+* Interpolation: the loss from every second row minus the loss from all rows, divided by PAIRS. This takes the error to
+  fall with the third power of the step.
+* Jumps of F, which are steps STEEP times as steep as both neighbours: half the product of the changes of F and s, as
+  the jump may be anywhere in its step. With interpolation, the two steps on each side of a jump count in the same way.
+* If something slides: the error of friction, weighted with the force.
+* Else the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS
+  for motions of several harmonics.
+* Else the solver and the mesh. The solver's part is its error of the area (`march.budget`) times NOISE, divided by the
+  root of the number of steps and by the sine of the phase, as the loop is the small difference of two paths. The part
+  of the mesh is MESH times the error of the area.
 """
 
 import math
@@ -61,11 +64,11 @@ CUT_OFF = "cut_off"
 
 
 class Slide(NamedTuple):
-    """Results of a slide: `mu_max` and its distance [m] from the start of the slide; means over the last three quarters
-    of it.
+    """Results of a slide. `mu_max` is at the distance `mu_max_distance` [m] from the start of the slide. `mu_dyn` and
+    both areas are means over the last three quarters of the distance slid.
 
-    Friction is NaN if it is undefined (steps without load), the corrected area is NaN if it is unknown, and all numbers
-    are NaN if the contact reaches the edge of the box from the start.
+    Friction is NaN if a step has no load, the corrected area is NaN if it is unknown, and all numbers are NaN if the
+    contact reaches the edge of the box from the start.
     """
 
     mu_max: float
@@ -88,7 +91,7 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
     """Return results of the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its
     rows, and `contact_area_corrected` if present.
 
-    Returns None if nothing slides, or has slid yet.
+    Returns None if no stage slides, or the slide has not begun.
     """
     every = _during(history, columns)
     rows = _inside(columns, every)
@@ -148,9 +151,9 @@ def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]
 
 
 def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the relative errors of friction and contact area, as means over the distance slid, which are printed at
-    the end of a run. Errors of friction are weighted by friction. Without a slide, the area's error in the last row;
-    NaN if unknown."""
+    """Return the relative errors of friction and contact area as means over the distance slid, by the names of their
+    columns. They are printed at the end of a run. Errors of friction are weighted by friction. Without a slide, only
+    the error of the area in the last row is returned. Errors that are not known are NaN."""
     if measure_slide(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
     rows, found = _during(history, columns), dict[str, float]()
@@ -170,10 +173,10 @@ def largest(values: Iterable[float]) -> float:
 
 
 def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
-    """Return by how much the friction in row `at` exceeds its mean over one cell [m] around it; 0 for steps of a cell
-    or more, and in the first cell of the slide, where friction rises.
+    """Return by how much the friction in the row with index `at` exceeds its mean over one cell [m] around this row.
 
-    Steps shorter than a cell meet the points of the grid in turn, which makes friction oscillate.
+    Steps shorter than a cell meet the points of the grid in turn, which makes friction oscillate. The result is 0 if
+    steps are a cell or longer, and in the first cell of the slide, where friction rises.
     """
     x, y = np.asarray(distance, float), np.asarray(friction, float)
     near = np.abs(x - x[at]) <= cell / 2 * (1 + SAME_INSTANT)
@@ -191,7 +194,8 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
 
 
 def mean_of_slide(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str) -> tuple[float, float]:
-    """Return the mean of a column over the last three quarters of a slide, and of its errors; unknown errors are 0."""
+    """Return the mean of a column over the last three quarters of a slide, and the mean of its absolute errors, in
+    which unknown errors count as 0."""
     distance, values, *errors = _at(columns, rows, "distance", name, *RELATIVE.get(name, ()))
     within = np.abs(values) * np.nan_to_num(errors[0] if errors else np.zeros(values.size))
     return mean_over_end(distance, values), mean_over_end(distance, within)
@@ -200,9 +204,10 @@ def mean_of_slide(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
 def describe_slide(
     history: Sequence[Stage], initial: Initial, cell: float, columns: Mapping[str, Sequence[float]]
 ) -> Iterator[str]:
-    """Yield sentences on the slide so far, from columns of the run; none before anything slides.
+    """Yield sentences on the slide so far, from columns of the run; no sentence before something slides.
 
-    `cell` is the spacing of the grid along x [m]. Until the last slide begins, sentences are about the slide before.
+    `cell` is the spacing of the grid along x [m]. If a history has several slides and the last one has not begun, the
+    sentences describe the slide before it.
     """
     last, starts = _slide(history), np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
     begun = int(np.count_nonzero(starts < columns["time"][-1] * (1.0 - SAME_INSTANT))) if columns["time"] else 0
@@ -352,8 +357,9 @@ Columns = Mapping[str, Sequence[float]]
 class Cycle:
     """A row of cycles.csv, for one whole cycle of a stage.
 
-    `loss` [J] has the relative error `error_loss`. Amplitudes are half the range within the cycle: of friction, NaN
-    where nothing slides, and of the approach [m]. `phase` is in rad, NaN if force or displacement is constant.
+    `loss` [J] has the relative error `error_loss`. An amplitude is half the range of a quantity within the cycle: of
+    friction [-], which is NaN where nothing slides, and of the approach [m]. `phase` is in rad, and NaN if force or
+    displacement is constant.
     """
 
     stage: int
@@ -464,7 +470,7 @@ def _step_error(job: Job, stage: Stage, dt: Array) -> float:
 
 
 def measure_last(job: Job, columns: Columns) -> dict[str, float]:
-    """Return the loss of the last cycle, its error, and the phase, by their names; empty without a whole cycle."""
+    """Return `loss`, `error_loss` and `phase` of the last cycle by these names; empty without a whole cycle."""
     found = find_cycles(job, columns)
     return {name: getattr(found[-1], name) for name in ("loss", "error_loss", "phase")} if found else {}
 
@@ -516,7 +522,8 @@ def friction_along(stage: Stage, columns: Mapping[str, Array]) -> Array:
 
 
 def way_along(stage: Stage, columns: Mapping[str, Array], start: float) -> Array | None:
-    """Return the positions [m] along the velocity of a stage that began at `start` [s]; None at constant velocity."""
+    """Return the positions [m] of the surface along the velocity of a stage, in each row, relative to its position at
+    the start of the stage at the time `start` [s]. Return None for a constant velocity, whose stage has no cycles."""
     if not isinstance(stage.velocity, Swing):
         return None
     return stage.speed * np.array([stage.moving(time - start) for time in columns["time"].tolist()])

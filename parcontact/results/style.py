@@ -102,7 +102,8 @@ def plain(text: str, most: int = 1000) -> str:
 
 
 def colors(count: int) -> list[str]:
-    """Return `count` different colours of lines: a sequence if the colours for colour-blind readers are too few."""
+    """Return `count` different colours of lines. If there are more lines than colours for colour-blind readers, the
+    colours go from dark to light."""
     return list(COLORS[:count]) if count <= len(COLORS) else sequence(count)
 
 
@@ -118,12 +119,12 @@ def mix(color: str, white: float) -> str:
 
 
 def line(number: int, count: int = 0) -> dict[str, Any]:
-    """Return colour and dashes of the line with this index, of `count` lines."""
+    """Return colour and dashes of line `number` (counted from 0) of `count` lines, as arguments of Matplotlib."""
     return {"color": colors(max(count, number + 1))[number], "linestyle": DASHES[number % len(DASHES)]}
 
 
 def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw] = ()) -> Figure:
-    """Draw groups of panels below each other in even rows, then `maps`, all of one size, with legends by
+    """Draw groups of panels below each other in even rows, then panels of maps, all of one size. Legends are placed by
     `place_legends`."""
     most = COLUMNS[sum(map(len, (*groups, maps))) > MANY_PANELS]
     width = WIDTH * most / COLUMNS[0]
@@ -146,9 +147,10 @@ def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw]
 
 
 def set_height(figure: Figure, height: float) -> None:
-    """Set the height [inch] of a figure, and fix its layout: Matplotlib would otherwise draw it once more to save it.
+    """Set the height [inch] of a figure and fix its layout, so that Matplotlib does not compute it again to save the
+    figure.
 
-    A single layout at a new height would keep the margins of the old height, so that the lowest labels leave the page.
+    The layout is computed twice, as the first one at a new height keeps the margins of the old height.
     """
     layouts = 1 if height == figure.get_figheight() else 2
     figure.set_figheight(height)
@@ -269,8 +271,8 @@ def _written(value: float) -> str:
 
 
 def label_map(axes: Axes, size: tuple[float, float]) -> float:
-    """Set the labels and the aspect of a map of a `size` [m], and return the ratio of its height to the panel's height.
-    The short side of a long map is stretched, and its label says so."""
+    """Set the labels and the aspect of a map of a `size` [m], and return the height of the map divided by the height of
+    its panel. The short side of a long map is stretched, and its label says so."""
     ratio = size[0] / size[1]
     stretched = "y" * bool(ratio > LONGEST) + "x" * bool(ratio < 1.0 / TALLEST)
     axes.set_aspect("auto" if stretched else "equal")
@@ -280,7 +282,8 @@ def label_map(axes: Axes, size: tuple[float, float]) -> float:
 
 
 def thin_log_ticks(axis: Axis) -> bool:
-    """Set few ticks on a logarithmic axis; return True if the axis has few decades, else ticks are at powers of ten."""
+    """Set few ticks on a logarithmic axis. Return True if the axis has few decades, with ticks at 1, 2 and 5 times
+    powers of ten; other axes have ticks at powers of ten only."""
     low, high = axis.get_view_interval()
     few = bool(high < 10.0**FEW_DECADES * low)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))

@@ -1,7 +1,6 @@
-"""`parcontact surface`: sentences and picture of a rigid surface.
+"""`parcontact surface`: sentences and picture of the rigid surface of a job.
 
-* Sentences and picture of the rigid surface of a job, for `parcontact surface`.
-* Picture of a rigid surface: its map, the distribution of its heights, and its spectra with the limits of the grid.
+The picture shows the map of the heights, their distribution, and their spectra with the limits of the grid.
 """
 
 from collections.abc import Iterator
@@ -47,7 +46,7 @@ def draw_surface(sketch: Sketch, path: Path) -> None:
 
 
 def panels_of(sketch: Sketch) -> dict[str, Panel]:
-    """Return the panels of a rigid surface by names of their contents."""
+    """Return the panels of a rigid surface, each by a text on what it shows."""
     found, (lx, ly) = sketch.found, sketch.size
     ends = _find_ends(drawn_points(sketch.heights))
     colors = Colors(sketch.heights, (0.0, lx, 0.0, ly), Axis("height", "m"), *ends, "cividis")
@@ -104,8 +103,9 @@ NOT_SELF_AFFINE = "no self-affine range was found"
 def describe_surface(
     job: Job, heights: Array, remarks: list[str], shortest: float | None, picture: Path
 ) -> Iterator[str]:
-    """Draw the picture of a surface and yield sentences on its heights [m], shape (ny, nx); root only. `shortest` [m]
-    is the shortest wave of a measured surface, else None. Raises InputError and RunError."""
+    """Draw the picture of a surface and yield sentences on its heights [m], shape (ny, nx). `remarks` are sentences on
+    how the heights were made, `shortest` [m] is the shortest wave of a measured surface, else None. Only the root rank
+    may call this function. Raises InputError and RunError."""
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
     found, part, measured = surface_statistics.surface_statistics(heights, job.grid.size), job.surface[0], None

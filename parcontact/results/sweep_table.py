@@ -58,7 +58,8 @@ def _asks_for(case: Case, section: str) -> bool:
 
 
 def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
-    """Yield, for each column of errors, the largest error of each finished case by the number of the case."""
+    """Yield a mapping for each column of errors. It has the largest error of each finished case by the number of the
+    case."""
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     for name in slide.ERRORS:
         found: dict[int, float] = {}
@@ -69,7 +70,8 @@ def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
 
 
 def fail(case: Case, reason: str) -> None:
-    """Store the reason why a case failed in its directory, or remove it if `reason` is ''; root only."""
+    """Store the reason why a case failed in the directory of the case; an empty `reason` removes a stored one. Root
+    only."""
     path = case.job.output.directory / FAILURE
     with suppress(OSError):
         if reason:
