@@ -35,7 +35,7 @@ OTHERS = {  # further tests of a part
     "physics/body.py": "scenarios/test_viscoelastic.py",
     "effects/adhesion/section.py": "effects/adhesion/test_effect.py",
     "effects/adhesion/adhesive_law.py": "effects/adhesion/test_gap_solver.py",
-    **dict.fromkeys(("contact/constraint.py", "contact/kernels.py"), "solve/test_contact.py"),
+    **dict.fromkeys(("contact/problem.py", "contact/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "effects/heat/test_heat.py accuracy/test_embedded.py",
 }

@@ -21,8 +21,7 @@ import numpy as np
 
 from ..contact import kernels
 from ..contact.certificate import Judge
-from ..contact.constraint import Constraint
-from ..contact.problem import Contact, MeanPressure
+from ..contact.problem import Constraint, Contact, MeanPressure
 from ..contact.splitting import Splitting
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 
-from ..contact.constraint import Box
+from ..contact.problem import Box
 from ..job import Job
 from ..march.curve import request
 from ..parallel.slab import Slab

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..contact.constraint import Box, Constraint, InterfaceLaw
+from ..contact.problem import Box, Constraint, InterfaceLaw
 from ..errors import InputError, RunError
 from ..files import hdf5
 from ..files.provenance import PROGRAM

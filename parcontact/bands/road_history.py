@@ -21,7 +21,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ..contact.constraint import InterfaceLaw
+from ..contact.problem import InterfaceLaw
 from ..effects.relaxation import relaxation_of
 from ..errors import RunError
 from ..files import outputs

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.constraint import Box, Constraint
+from ..contact.problem import Box, Constraint
 from ..job.history import Step
 from ..march.laws import ClosingLaw
 from ..march.loop import March, run_steps

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Certificate
 from . import kernels
-from .constraint import Box
-from .problem import Approach, Control
+from .problem import Approach, Box, Control
 
 LEAST_SHARE = 0.1  # accuracy: least length that gaps are compared with, over the mean displacement under pressure
 LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where displacements are only rounding

@@ -30,9 +30,8 @@ from ..physics.convolution import Convolution
 from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Judge, describe_failure
-from .constraint import Box, scale_to_load
 from .preconditioner import ALL, ExtendedPreconditioner, Grids
-from .problem import Contact, MeanPressure, Operator
+from .problem import Box, Contact, MeanPressure, Operator, scale_to_load
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual and the last two changes

@@ -39,9 +39,8 @@ from ..physics import loops
 from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Iterate, certify, form_iterate
-from .constraint import scale_to_load
 from .preconditioner import ALL, ExtendedPreconditioner, Grids
-from .problem import Contact, Problem, Workspace
+from .problem import Contact, Problem, Workspace, scale_to_load
 
 # tuning
 MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate

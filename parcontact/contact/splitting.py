@@ -42,9 +42,8 @@ from ..physics.convolution import Convolution
 from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Judge, describe_failure
-from .constraint import Box, Constraint
 from .preconditioner import ALL, Grids
-from .problem import Contact, Control, MeanPressure, Operator
+from .problem import Box, Constraint, Contact, Control, MeanPressure, Operator
 from .projected import Projected
 
 DEPTH = 5  # tuning: number of earlier changes

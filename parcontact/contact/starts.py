@@ -36,9 +36,8 @@ from ..parallel.slab import Array, Slab, allocate
 from ..physics import loops
 from ..physics.convolution import SIDE, TileConvolution, TileOperator, Tiles, tiles_along
 from . import kernels
-from .constraint import Box
 from .preconditioner import Grids
-from .problem import Contact, Control, MeanPressure, Operators, Problem
+from .problem import Box, Contact, Control, MeanPressure, Operators, Problem
 from .solver import ContactSolver
 
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, P
 
 from numpy.typing import DTypeLike, NDArray
 
-from ..contact.constraint import Box, Mask
+from ..contact.problem import Box, Mask
 from ..doubts import Doubt
 from ..errors import InputError
 from ..job import Job, listing

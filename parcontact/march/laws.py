@@ -6,7 +6,7 @@ already the solution. With steps of a whole cell this is the last pressure, extr
 steps of half a cell, the one before the last; with thirds and quarters, an earlier one that is stored in slides with
 chosen steps. Otherwise the last two pressures are extrapolated in the body's frame.
 
-`DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.constraint`), solved from the
+`DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.problem`), solved from the
 last pressures. `ClosingLaw` is the law of a surface whose finer roughness is squeezed in the interface: under pressure
 the mean planes of this roughness approach by the closing c. With the modulus alpha of a step, in which the pressure is
 `alpha p`,
@@ -28,8 +28,7 @@ import numpy as np
 
 from ..contact import starts
 from ..contact.certificate import Judge
-from ..contact.constraint import Constraint
-from ..contact.problem import Contact, Control, MeanPressure, Problem, reachable_certificate
+from ..contact.problem import Constraint, Contact, Control, MeanPressure, Problem, reachable_certificate
 from ..contact.splitting import Splitting
 from ..effects.effect import ContactLaw, Detached, EdgeMotion, PreviousContacts, PreviousPressure, SolvedContact
 from ..errors import InputError, RunError

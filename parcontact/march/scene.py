@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.constraint import Box
 from ..contact.preconditioner import grids_for
-from ..contact.problem import Operators, Workspace
+from ..contact.problem import Box, Operators, Workspace
 from ..contact.solver import ContactSolver
 from ..contact.starts import LARGER_CELLS, SolverOnTiles
 from ..effects import effect

@@ -17,9 +17,8 @@ import numpy as np
 
 from ..contact import kernels, starts
 from ..contact.certificate import Judge, Lines
-from ..contact.constraint import Box
 from ..contact.preconditioner import grids_for
-from ..contact.problem import Contact, reachable_certificate
+from ..contact.problem import Box, Contact, reachable_certificate
 from ..contact.projected import FreeSteadySolver
 from ..contact.splitting import SteadySolver
 from ..doubts import Doubt

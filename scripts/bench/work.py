@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from runs import Json, begun
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import Contact, MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.problem import Box, Contact, MeanPressure, Operators, Problem, Workspace
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab

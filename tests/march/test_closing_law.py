@@ -11,7 +11,7 @@ from parcontact import job as jobs
 from parcontact.bands.band import Band, PressureLadder
 from parcontact.bands.cascade import Cascade
 from parcontact.bands.choice import cut_bands
-from parcontact.contact.constraint import Box, Constraint, InterfaceLaw
+from parcontact.contact.problem import Box, Constraint, InterfaceLaw
 from parcontact.errors import InputError
 from parcontact.files.recorder import StepRow
 from parcontact.march.laws import ClosingLaw

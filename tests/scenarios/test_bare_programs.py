@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
 
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.problem import Box, MeanPressure, Operators, Problem, Workspace
 from parcontact.contact.solver import ContactSolver
 from parcontact.job import Job
 from parcontact.job.history import Timeline

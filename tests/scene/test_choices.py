@@ -26,8 +26,7 @@ from counting import (
 )
 from marched_jobs import begun, marched
 
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import Approach, Problem
+from parcontact.contact.problem import Approach, Box, Problem
 from parcontact.job.history import Timeline
 from parcontact.march import choices
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import Approach, Contact, MeanPressure, Operator, Operators, Problem, Workspace
+from parcontact.contact.problem import Approach, Box, Contact, MeanPressure, Operator, Operators, Problem, Workspace
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab

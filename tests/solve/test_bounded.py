@@ -9,8 +9,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import Approach, Contact, MeanPressure
+from parcontact.contact.problem import Approach, Box, Contact, MeanPressure
 
 from .bodies import BODIES, TIGHT, Bench, Map, rough, solver, white
 

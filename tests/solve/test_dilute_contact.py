@@ -8,8 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import Box
-from parcontact.contact.problem import Approach, Contact, MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.problem import Approach, Box, Contact, MeanPressure, Operators, Problem, Workspace
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from parcontact.contact.certificate import Lines, form_iterate
-from parcontact.contact.constraint import Box
+from parcontact.contact.problem import Box
 from parcontact.parallel.slab import Slab
 
 ROUNDING = 1e-12  # of sums over some hundred points

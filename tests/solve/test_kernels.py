@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from parcontact.contact import kernels
-from parcontact.contact.constraint import Box, scale_to_load
+from parcontact.contact.problem import Box, scale_to_load
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from ...columns import added_by
-from ...contact.constraint import Mask
+from ...contact.problem import Mask
 from ...doubts import Doubt, Kind
 from ...job import limits
 from ...job.parts import Part, Rule, rules_of

@@ -57,7 +57,7 @@ from ...contact import kernels
 from ...contact.certificate import LEAST_SHARE as SOLVER_LEAST_SHARE
 from ...contact.problem import Approach, Control, MeanPressure, Operator
 from ...parallel.slab import Array, Slab
-from ...physics.measures import Certificate
+from ...physics.records import Certificate
 
 EXPONENTIAL, DUGDALE = 0, 1
 LOG_TWO = math.log(2.0)

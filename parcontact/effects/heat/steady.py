@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...contact.constraint import Box, Mask
+from ...contact.problem import Box, Mask
 from ...doubts import Doubt, Kind
 from ...errors import InputError, UnsolvedError
 from ...job import Job, Zener

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...columns import added_by
-from ...contact.constraint import Mask
+from ...contact.problem import Mask
 from ...job import limits
 from ...job.parts import Part, Rule
 from ...job.stages import Stage

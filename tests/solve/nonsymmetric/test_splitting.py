@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from parcontact.contact.certificate import Judge
-from parcontact.contact.constraint import Box, InterfaceLaw
-from parcontact.contact.problem import Approach, MeanPressure
+from parcontact.contact.problem import Approach, Box, InterfaceLaw, MeanPressure
 from parcontact.contact.projected import Projected
 from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
 from parcontact.effects.layer.response import Layer
