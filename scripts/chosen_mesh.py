@@ -13,7 +13,7 @@ A chosen mesh is compared with the cheapest mesh that has LENGTHS along each sid
 and change signs from mesh to mesh, so a coarse mesh may keep an accuracy by chance. The cheapest mesh is therefore one
 that keeps the accuracy together with all meshes that are as fine or finer along each side.
 
-The last lines judge MORE of `march.mesh`, by the guessed over the true area; LONG_CELLS of `physics.measures`, by the
+The last lines judge MORE of `march.mesh`, by the guessed over the true area; LONG_CELLS of `physics.records`, by the
 true excess of the counted area over the assumed one, on meshes with square and with long cells; and SEED_FRICTION and
 SEED_AREA of `job.advice`, by the scatter over SEEDS surfaces times the number of longest waves along a side. SURE of
 `job.advice`, and SLOWNESS of `march.mesh`, are judged by the errors of chosen meshes.

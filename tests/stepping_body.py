@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from parcontact.parallel.slab import Array
 from parcontact.physics.body import BodyMemory, MovedHeights, Trial, ZenerBody, surface_of
-from parcontact.physics.entries import Entry, Saved, Units
+from parcontact.physics.records import Entry, Saved, Units
 
 
 class HeldBody:

@@ -29,7 +29,7 @@ from ..files.recorder import StepRow
 from ..job import Job
 from ..march.point import Point
 from ..parallel.slab import Array, Slab
-from ..physics.measures import Measures
+from ..physics.records import Measures
 from .band import NODES, PressureLadder, Rung
 from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
 from .cascade import Cascade, Results, mean_rungs

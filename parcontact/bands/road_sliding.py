@@ -22,7 +22,7 @@ from ..march.curve import States, on_one_grid
 from ..march.point import Point
 from ..march.scene import Setup
 from ..parallel.slab import Array, Slab
-from ..physics.measures import Certificate, Measures
+from ..physics.records import Certificate, Measures
 from .band import Rung, Vector, direction_of
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parallel.slab import Array, Slab
-from ..physics.measures import Certificate
+from ..physics.records import Certificate
 from . import kernels
 from .problem import Approach, Box, Control
 

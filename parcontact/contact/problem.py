@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from ..compiled import loop
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
-from ..physics.measures import Certificate
+from ..physics.records import Certificate
 
 Mask = NDArray[Any]  # a map that is not 0 at the selected points
 

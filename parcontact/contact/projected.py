@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..compiled import loop
 from ..parallel.slab import Array
 from ..physics.convolution import Convolution
-from ..physics.measures import Certificate
+from ..physics.records import Certificate
 from . import kernels
 from .certificate import Judge, describe_failure
 from .preconditioner import ALL, ExtendedPreconditioner, Grids

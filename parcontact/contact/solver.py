@@ -36,7 +36,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab, reused
 from ..physics import loops
-from ..physics.measures import Certificate
+from ..physics.records import Certificate
 from . import kernels
 from .certificate import Iterate, certify, form_iterate
 from .preconditioner import ALL, ExtendedPreconditioner, Grids

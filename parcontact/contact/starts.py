@@ -10,7 +10,7 @@ touch only if
 
     u - max(h) - d < MARGIN L,
 
-with L the length by which u varies within the contact (`measures.Certificate`). Tiles of 32 x 32 points with such
+with L the length by which u varies within the contact (`records.Certificate`). Tiles of 32 x 32 points with such
 blocks, with blocks under pressure, or with neighbours of these blocks are stacked to one map. There `ContactSolver`
 solves the same problem with operators on tiles (`physics.convolution`). These also give the displacement at all points
 of the grid, so that `ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the

@@ -30,9 +30,8 @@ from ..job.history import Step
 from ..job.listing import effects_of
 from ..job.parts import Part
 from ..parallel.slab import Array
-from ..physics.entries import Entry, Memory, Saved, Units
-from ..physics.measures import Measures
 from ..physics.motion import Shear, Vector
+from ..physics.records import Entry, Measures, Memory, Saved, Units
 
 if TYPE_CHECKING:
     from ..contact.problem import Contact, Control

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, RunError
 from ..job import HeightArray
 from ..parallel.slab import Array, Slab
-from ..physics.entries import Entry
+from ..physics.records import Entry
 from . import files, hdf5
 from .provenance import Link, Provenance, read_chain
 

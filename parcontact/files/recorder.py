@@ -25,7 +25,7 @@ from ..columns import MEASURES, cells, choose_columns, names_of, values_of
 from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget
 from ..parallel.slab import Array
-from ..physics.measures import Certificate, Measures
+from ..physics.records import Certificate, Measures
 from ..streams import printable
 from . import fields, files, hdf5, outputs
 from .checkpoint import Contents, TableMark

@@ -15,7 +15,7 @@ from ..job import Job, Stage, listing
 from ..job.history import ChosenSteps, Step, Timeline, reached
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
-from ..physics.entries import part_of
+from ..physics.records import part_of
 from . import checkpoint, outputs
 from .checkpoint import Contents
 from .directory import ADVICE, Directory

@@ -22,7 +22,7 @@ from ..march.loop import March
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.body import states_errors
-from ..physics.entries import Saved, part_of
+from ..physics.records import Saved, part_of
 from ..printed import quantity
 from ..results import slide
 from ..results.results import Results

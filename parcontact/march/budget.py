@@ -4,7 +4,7 @@ The errors of all sources are added. They are calibrated estimates that hold in 
 much smaller. Each source estimates a relative error from numbers of a step, with constants fitted to true errors
 (`constants`). N is the number of spots of contact, and c is the relative excess of the counted over the corrected area.
 
-solver: for friction proportional to the `complementarity` C of the certificate (`physics.measures`), and smaller for
+solver: for friction proportional to the `complementarity` C of the certificate (`physics.records`), and smaller for
 many spots. Where friction is far below the slopes, it is a small difference of large forces: errors of pressures then
 count more, by the root of the ratio, and pressures with the error C may have tangential forces of NOISE C times the
 slopes. Friction by energy is a sum of squares: it is not known below the square of SINGLE, to which pressures are
@@ -44,8 +44,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.entries import Entry, Saved
 from ..physics.prony import Prony, complex_modulus
+from ..physics.records import Entry, Saved
 from ..printed import per_cent
 from .constants import (
     AREA,

@@ -33,7 +33,7 @@ from ..job.advice import one_cell
 from ..job.calculation import Accuracy
 from ..job.history import Bounds, ChosenEnds, ChosenSteps, MadeStep, Span, Step, Timeline, reached
 from ..physics.body import Body, remembers
-from ..physics.entries import Entry, Saved, Units
+from ..physics.records import Entry, Saved, Units
 from .budget import ErrorBudget, ErrorParts
 from .time_error import order_of_time_error
 

@@ -12,7 +12,7 @@ from ..job.calculation import FIELDS_NEED, components_of
 from ..job.history import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import remembers
-from ..physics.entries import Entry
+from ..physics.records import Entry
 from .budget import ErrorSums
 from .laws import DetachedError, choose_contact_law
 from .scene import Scene

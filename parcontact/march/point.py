@@ -16,8 +16,8 @@ import numpy as np
 from ..contact.problem import Contact
 from ..parallel.slab import Array, deal
 from ..physics.convolution import PARTS, wavenumbers
-from ..physics.measures import Certificate, Measures
 from ..physics.prony import Prony
+from ..physics.records import Certificate, Measures
 from .budget import ErrorBudget
 from .scene import Setup
 

@@ -19,7 +19,7 @@ from ..job.limits import MOST_STEPS
 from ..parallel import regrid
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import wavenumbers
-from ..physics.measures import Measures
+from ..physics.records import Measures
 from ..printed import rounded_up
 from .measured_range import doubt_band
 from .scene import Setup, set_up

@@ -28,10 +28,10 @@ from ..parallel.slab import Array, Slab
 from ..physics.body import Body, ElasticBody, ZenerBody, states_errors
 from ..physics.convolution import SIDE, TileConvolution, TileOperator, Tiles
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, Probe, ZenerEnergy
-from ..physics.entries import Units
 from ..physics.halfspace import HalfSpace
 from ..physics.motion import PARTS, AlongX, AnyFraction, Motion, Vector
 from ..physics.prony import Prony
+from ..physics.records import Units
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..printed import quantity

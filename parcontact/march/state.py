@@ -22,9 +22,8 @@ from ..job.history import ChosenSteps, Step
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory, Trial, remembers, states_errors
 from ..physics.energy import EnergyMemory
-from ..physics.entries import Entry, RunPart, Saved, Units, part_of, with_part
-from ..physics.measures import Measures
 from ..physics.motion import friction_by_energy
+from ..physics.records import Entry, Measures, RunPart, Saved, Units, part_of, with_part
 from .budget import ErrorBudget, ErrorSums, estimate
 from .constants import ENERGY
 from .controller import StepTolerance, TolerancePart

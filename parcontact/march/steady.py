@@ -29,8 +29,8 @@ from ..job.listing import answers
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
-from ..physics.measures import Certificate, Measures
 from ..physics.prony import complex_modulus
+from ..physics.records import Certificate, Measures
 from . import sanity
 from .budget import ErrorBudget, estimate_steady
 from .choices import choices

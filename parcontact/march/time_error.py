@@ -47,8 +47,8 @@ from typing import Any
 import numpy as np
 
 from ..job import Cylinder, Flat, Job, Rough, Wave
-from ..physics.measures import excess_of
 from ..physics.prony import Prony, complex_modulus
+from ..physics.records import excess_of
 from .constants import (
     CURVED_RISE,
     EQUAL_DIFFERENCE,

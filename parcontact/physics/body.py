@@ -40,8 +40,8 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .entries import Entry, Saved, Units
 from .prony import Advance, Prony, coefficients, elapsed
+from .records import Entry, Saved, Units
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ rule, the dissipated power is taken at the end of the step, and the balance clos
 Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length S
 of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx` (V.
 A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells this is
-`SIDE` for each side between a point in contact and one that is not, and less on long cells (`measures.excess_of`).
+`SIDE` for each side between a point in contact and one that is not, and less on long cells (`records.excess_of`).
 
 This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, the pressure ends at the hardness
 H, and a point on the edge carries the share p/H of the hardness: the excess is `1 - p/H` of a cell, and 0 at points
@@ -41,10 +41,9 @@ from ..parallel import regrid
 from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, MovedHeights, ZenerBody, surface_of
-from .entries import Entry, Saved, Units
-from .measures import Measures, excess_of
 from .motion import Shear, Vector
 from .prony import Prony, bend
+from .records import Entry, Measures, Saved, Units, excess_of
 from .surface import Surface
 
 SMALL = 1.0  # rounding: z below which integrals over a step are computed by Gauss's rule, to fifteen digits

@@ -11,8 +11,8 @@ from scipy.special import j1, spherical_jn
 
 from parcontact.march.budget import ErrorParts, estimate, estimate_steady, lost_at_edges, lost_in_short_waves
 from parcontact.march.time_error import RunProperties, StepObservation, count_spots, radius_of
-from parcontact.physics.measures import SIDE
 from parcontact.physics.prony import Prony
+from parcontact.physics.records import SIDE
 
 RUN = RunProperties(10_000, cells_per_wave=8.0, folded=1e-4)
 SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02)

@@ -17,7 +17,7 @@ from parcontact.job.history import Timeline
 from parcontact.job.listing import plain_data
 from parcontact.march.loop import March, run_steps
 from parcontact.march.state import parts_of
-from parcontact.physics.entries import Units
+from parcontact.physics.records import Units
 
 FIELDS = ("pressure", "displacement", "gap", "height")
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1e-4, "rms_slope": 0.02}

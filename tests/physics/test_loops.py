@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
-from parcontact.physics.entries import Units
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.loops import lowest, rows_of, shape_of
 from parcontact.physics.motion import friction_by_energy
+from parcontact.physics.records import Units
 from parcontact.physics.roughness import moments
 from parcontact.physics.surface import Surface
 

@@ -10,7 +10,6 @@ from stepping_body import HeldBody
 
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
-from parcontact.physics.entries import Units
 from parcontact.physics.prony import (
     Integrator,
     Prony,
@@ -20,6 +19,7 @@ from parcontact.physics.prony import (
     normal_form,
     zener_to_prony,
 )
+from parcontact.physics.records import Units
 
 POINT = Slab.alone(1, 1)
 # two Zener branches next to a spring of 0.5 MPa, and the time step of the printed numbers

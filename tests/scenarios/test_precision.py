@@ -24,7 +24,7 @@ from parcontact.march import sanity, scene
 from parcontact.march.laws import StepError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.energy import Probe
-from parcontact.physics.measures import Certificate, Measures
+from parcontact.physics.records import Certificate, Measures
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "rms_slope": 0.02, "seed": 1}
 DECADES = {

@@ -11,7 +11,7 @@ from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.measures import Certificate
+from parcontact.physics.records import Certificate
 from parcontact.physics.roughness import Roughness
 
 Map = NDArray[np.float64]

@@ -19,7 +19,7 @@ from parcontact.contact.problem import Approach, MeanPressure, Operators
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import measures
+from parcontact.physics import records
 from parcontact.physics.halfspace import HalfSpace
 
 from . import polonsky_keer
@@ -133,8 +133,8 @@ def test_periodic_approach_beyond_full_contact_fails() -> None:
 
 
 def test_what_a_contact_reports_is_documented() -> None:
-    for field in dataclasses.fields(measures.Certificate):
-        assert f"{field.name}: " in str(measures.Certificate.__doc__)
+    for field in dataclasses.fields(records.Certificate):
+        assert f"{field.name}: " in str(records.Certificate.__doc__)
 
 
 # -- what a contact costs: starts, messages and operator calls of an iteration, single precision ----------------------

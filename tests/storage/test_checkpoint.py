@@ -13,7 +13,7 @@ from parcontact.files import checkpoint, hdf5
 from parcontact.files.checkpoint import Contents, Facts
 from parcontact.files.provenance import Link, Provenance
 from parcontact.parallel.slab import Slab
-from parcontact.physics.entries import Entry
+from parcontact.physics.records import Entry
 from parcontact.results import info
 
 NX, NY = 6, 9

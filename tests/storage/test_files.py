@@ -21,7 +21,7 @@ from parcontact.files.tables import GrowingTable, lacking_points, of_table, read
 from parcontact.job import load
 from parcontact.march.choices import choices
 from parcontact.parallel.slab import Slab
-from parcontact.physics.measures import Measures
+from parcontact.physics.records import Measures
 
 
 def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:

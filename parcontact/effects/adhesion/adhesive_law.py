@@ -30,9 +30,8 @@ from ...parallel import regrid
 from ...parallel.slab import Array, Slab
 from ...physics import loops
 from ...physics.body import Trial
-from ...physics.entries import Entry, Saved, Units
-from ...physics.measures import SIDE, Certificate, Measures
 from ...physics.motion import cells_between
+from ...physics.records import SIDE, Certificate, Entry, Measures, Saved, Units
 from ..effect import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, end_in, entries_of_end, nothing_holds
 from .gap_solver import (
     DUGDALE,

@@ -29,8 +29,7 @@ from ...job.yaml_text import Fault
 from ...march.constants import ENERGY
 from ...parallel.slab import Array
 from ...physics.body import remembers
-from ...physics.entries import Entry, Saved, Units
-from ...physics.measures import Measures
+from ...physics.records import Entry, Measures, Saved, Units
 from ..effect import (
     BY_THEORY,
     EXTRAPOLATION,

@@ -21,8 +21,8 @@ from ...job.yaml_text import Fault
 from ...parallel import fft
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
-from ...physics.entries import Entry, Saved, Units
 from ...physics.prony import Exponentials, Prony, fit_exponentials
+from ...physics.records import Entry, Saved, Units
 from ..effect import Changes, Decision, Effect, Instant
 from ..relaxation import factor_at, temperature_of
 from . import ERROR

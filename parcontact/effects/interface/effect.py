@@ -15,9 +15,8 @@ from ...job import limits
 from ...job.parts import Flag, Part, Positive, Rule, rules_of
 from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
-from ...physics.entries import Memory
-from ...physics.measures import Measures
 from ...physics.motion import InterfaceFriction
+from ...physics.records import Measures, Memory
 from ..effect import Changes, Decision, Effect, Instant
 from ..relaxation import time_factor_of
 

@@ -16,7 +16,7 @@ from ...job.parts import Part, Rule
 from ...job.stages import Stage
 from ...parallel.root import on_root
 from ...parallel.slab import Array
-from ...physics.entries import Entry, Saved, Units
+from ...physics.records import Entry, Saved, Units
 from ..effect import Changes, ContactLaw, Decision, Detached, Effect, Instant, end_in
 from .flow import leak
 from .section import RULES, Leakage, SealStage, drop_at

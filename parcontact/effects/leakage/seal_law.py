@@ -23,9 +23,8 @@ from ...parallel import regrid
 from ...parallel.root import on_root
 from ...parallel.slab import Array
 from ...physics.body import Trial
-from ...physics.entries import Entry, Saved, Units
-from ...physics.measures import Measures
 from ...physics.motion import cells_between
+from ...physics.records import Entry, Measures, Saved, Units
 from ..effect import (
     ContactLaw,
     Detached,

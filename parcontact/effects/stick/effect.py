@@ -54,9 +54,8 @@ from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import BodyMemory, MovedHeights, surface_of
 from ...physics.energy import EnergyMemory, Pressed
-from ...physics.entries import Entry, Saved, Units
-from ...physics.measures import Measures
 from ...physics.motion import Vector
+from ...physics.records import Entry, Measures, Saved, Units
 from ..effect import Changes, Instant, Sheared
 from ..interface.effect import InterfaceEffect, shares
 from . import solver

@@ -20,7 +20,7 @@ from parcontact.march.constants import ENERGY
 from parcontact.march.mesh import load, load_cases
 from parcontact.march.scene import set_up
 from parcontact.parallel.slab import Slab
-from parcontact.physics.measures import Measures
+from parcontact.physics.records import Measures
 
 E = 4e6  # E* of an incompressible body of 1 MPa [Pa]
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}

@@ -15,7 +15,7 @@ from parcontact.effects.adhesion.gap_solver import GapOperators, GapProblem, Gap
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.measures import Certificate
+from parcontact.physics.records import Certificate
 
 NX, NY = 24, 20
 WEAK = Law(0, 0.4, 0.2)
