@@ -14,8 +14,7 @@ from numpy.typing import DTypeLike
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution, MirroredConvolution
-from parcontact.physics.halfspace import UNIFORM, HalfSpace
-from parcontact.physics.love import love
+from parcontact.physics.halfspace import UNIFORM, HalfSpace, love
 
 from .maps import coordinates, gathered, product, random_map
 

@@ -14,10 +14,9 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab, Tally
 from parcontact.physics import convolution
-from parcontact.physics import love as wake
+from parcontact.physics import halfspace as wake
 from parcontact.physics.convolution import SIDE, Tiles
-from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.love import love
+from parcontact.physics.halfspace import HalfSpace, love
 from parcontact.physics.prony import Prony, creep_spectrum
 
 from .maps import gathered, random_map

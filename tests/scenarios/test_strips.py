@@ -11,9 +11,8 @@ from mpi4py import MPI
 import parcontact as pc
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import love as strip
-from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.love import cell_factor, love
+from parcontact.physics import halfspace as strip
+from parcontact.physics.halfspace import HalfSpace, cell_factor, love
 
 G, R, LENGTH, WIDTH = 1.0e6, 1.0e-2, 1.0e-4, 1.0e-3  # [Pa], of the cylinder [m], of the box along x and y [m]
 E_STAR = 4.0 * G  # of an incompressible body on a rigid one

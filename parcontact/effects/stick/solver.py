@@ -46,8 +46,8 @@ displacement at a distance (x, y) from the centre of a cell is the integral over
 
     u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi),
 
-and u_y with x and y exchanged. The displacement follows from the integrals over the cell of 1/r (`love.over_cell`), of
-`x^2/r^3`, with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
+and u_y with x and y exchanged. The displacement follows from the integrals over the cell of 1/r
+(`halfspace.over_cell`), of `x^2/r^3`, with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
 """
 
 import math
@@ -64,7 +64,7 @@ from ...contact.problem import Operator
 from ...parallel.fft import FFT, Spectrum
 from ...parallel.slab import Array, Slab, allocate
 from ...physics.convolution import padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
-from ...physics.love import love
+from ...physics.halfspace import love
 
 AT_BOUND = 1.0 - 1e-12  # rounding: share of its bound from which a traction is at it
 ACROSS = 0.5  # tuning: least component of a traction across an axis, over the one along it, for moves along the axis
