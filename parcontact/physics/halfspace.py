@@ -59,7 +59,6 @@ from ..compiled import loop, pointwise
 from ..errors import InputError
 from ..parallel.fft import FFT, Cosines, Spectrum
 from ..parallel.slab import Array, Tally
-from . import love
 from .convolution import (
     ALL,
     LONGEST_CELL,
