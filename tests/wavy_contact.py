@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from parcontact.theory.full_contact import Array, Values
+from parcontact.theory.wavy import Array, Values
 
 
 class Reference(NamedTuple):

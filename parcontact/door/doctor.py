@@ -35,7 +35,7 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics import loops, prony
 from ..physics.prony import Integrator
-from ..theory import full_contact, hertz, persson, westergaard
+from ..theory import hertz, persson, wavy
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -333,13 +333,13 @@ def markdown(results: Iterable[tuple[Check, Bench]]) -> str:
 def nearly_full(bench: Bench) -> None:
     """Check Westergaard's wave at 0.99, 1 and 1.01 of the load of full contact."""
     for share in (0.99, 1.0, 1.01):
-        mean = share * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+        mean = share * float(wavy.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
         job = wave([{"pressure": mean}, {"pressure": mean}], points=(256, 1), material=RUBBER)
         march, rows = bench.march(job)
         x = np.arange(256) * WAVELENGTH / 256
-        exact = westergaard.pressure(x, mean, HEIGHT, WAVELENGTH, GLASSY)
+        exact = wavy.pressure(x, mean, HEIGHT, WAVELENGTH, GLASSY)
         bench.expect_all("Westergaard", bench.whole(march, "pressure")[0], exact, 1e-9 if share > 1 else 5e-3)
-        area = float(westergaard.contact_fraction(mean, HEIGHT, WAVELENGTH, GLASSY))
+        area = float(wavy.contact_fraction(mean, HEIGHT, WAVELENGTH, GLASSY))
         bench.expect("area", rows[-1].measures.contact_area, area, 2 / 256 if share <= 1 else 0.0, scale=1.0)
     bench.expect("iterations", bench.iterations, 0.0, ITERATIONS, scale=1.0)
 
@@ -355,12 +355,12 @@ def closed_by_load(bench: Bench) -> None:
     stage = {"pressure": 1e6, "velocity": velocity, "distance": 5 * WAVELENGTH, "cells_per_step": 1}
     _, rows = bench.march(wave([stage], points=(points, points), surface=surface, initial=start))
     x, y, share = np.array(WAVES).T
-    rings = persson.rings_of_surface(full_contact.Waves((share * HEIGHT).astype(complex), K * x, K * y))
+    rings = persson.rings_of_surface(wavy.Waves((share * HEIGHT).astype(complex), K * x, K * y))
     omega = rings.waves.kx * velocity
     exact = prony.complex_modulus(omega, *PRONY)
     discrete = prony.discrete_modulus(omega, WAVELENGTH / points / velocity, *PRONY)
     for what, row, modulus in (("force", rows[0], exact), ("force of steps", rows[-1], discrete)):
-        forces = full_contact.traction(*rings.waves, modulus) * WAVELENGTH**2
+        forces = wavy.traction(*rings.waves, modulus) * WAVELENGTH**2
         bench.expect_all(what, [row.measures.force_x, row.measures.force_y], forces, 1e-8)
         for gamma in (0.0, 1.0):
             friction = -row.measures.force_x / (1e6 * WAVELENGTH**2)

@@ -26,7 +26,7 @@ from ..march.curve import Request, request
 from ..parallel.slab import Slab
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
-from ..theory import full_contact, persson
+from ..theory import persson, wavy
 from ..theory.persson import Memory, Rings, SlidingLeg, follow
 from .info import FILE, TheorySettings, describe_theory
 
@@ -127,7 +127,7 @@ def predict_steady(
     for speed, pressure, temperature in wanted.points:
         at = job if math.isnan(temperature) else job.at_temperature(temperature)
         body, (vx, vy) = _material(at), wanted.velocity(speed)
-        omega = full_contact.frequency(kx, ky, vx, vy)
+        omega = wavy.frequency(kx, ky, vx, vy)
         modulus = complex_modulus(omega, body.modulus_inf, body.moduli, body.relaxation_times)
         friction = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
         area = persson.contact_area(pressure, rings, modulus)
@@ -268,7 +268,7 @@ def _lattice(job: Job, slab: Slab) -> Rings:
     setup = scene.set_up(job, slab)
     heights = setup.units.height * setup.surface.heights((0.0, 0.0), slab.empty())
     try:
-        return persson.rings_of_surface(full_contact.waves(heights, *job.grid.size))
+        return persson.rings_of_surface(wavy.waves(heights, *job.grid.size))
     except ValueError as error:
         raise InputError(f"surface: {error}") from None
 

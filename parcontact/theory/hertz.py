@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from scipy.special import hyp1f1
 
 from ..physics.prony import Moduli, normal_form, relaxation_integral
-from .full_contact import Array, Values
+from .wavy import Array, Values
 
 
 def contact_modulus(shear_modulus: Values, poisson: Values = 0.5) -> Array:

@@ -2,7 +2,7 @@
 
 If waves up to the wavenumber k are included, the pressure in full contact has the variance Var p(k), and its
 distribution spreads from its mean p0; points with tension are not in contact. With the transfer modulus M of each wave
-as in `full_contact` (G* in steady sliding, functions of time in any other history) and <h^2> = int Phi d2q/(4 pi^2):
+as in `wavy` (G* in steady sliding, functions of time in any other history) and <h^2> = int Phi d2q/(4 pi^2):
 
     Var p(k) = int_{|q| < k} Phi 4 q^2 |M|^2 d2q/(4 pi^2)
     A(k)/A0 = P(k) = erf(p0/sqrt(2 Var p(k)))
@@ -28,7 +28,7 @@ log(k/smallest) at small areas, which is smooth in x. Partial sums within a ring
 points of its panel, so that sums and partial sums have the same errors.
 
 Histories have piecewise constant velocities: rest, starts, stops, reversals, changes of load. In the transfer modulus M
-of a wave (see `full_contact`) every term of the relaxation function has a memory m_j of the way in which the wave has
+of a wave (see `wavy`) every term of the relaxation function has a memory m_j of the way in which the wave has
 passed a point of the body. For constant omega = q . v and a memory m_j(0) at t = 0,
 
     M(t) = G_inf + sum_j G_j m_j(t)
@@ -51,8 +51,8 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from ..physics.prony import Prony, normal_form
-from . import full_contact
-from .full_contact import Array, ComplexArray, ComplexValues, Values, Waves
+from . import wavy
+from .wavy import Array, ComplexArray, ComplexValues, Values, Waves
 
 GAMMA = 0.45  # physics: the empirical factor of the paper
 EQUAL = 1e-9  # accuracy: difference of equal wavenumbers over the largest
@@ -97,7 +97,7 @@ class Rings:
 
 
 def rings_of_surface(waves: Waves) -> Rings:
-    """Return the rings of given waves (`full_contact.waves`). Half of the sum of a ring counts as within it."""
+    """Return the rings of given waves (`wavy.waves`). Half of the sum of a ring counts as within it."""
     k = np.hypot(waves.kx, waves.ky)
     order = np.argsort(k)
     starts = np.flatnonzero(np.diff(k[order], prepend=-np.inf) > EQUAL * k.max(initial=0.0))
@@ -192,7 +192,7 @@ def friction_coefficient(
 
 def _variances(rings: Rings, modulus: ComplexValues) -> Array:
     """Return the contribution of each ring to the variance of the pressure [Pa^2]."""
-    return rings.sums(np.abs(rings.stiffness * full_contact.pressure_amplitude(*rings.waves, modulus)) ** 2 / 2)
+    return rings.sums(np.abs(rings.stiffness * wavy.pressure_amplitude(*rings.waves, modulus)) ** 2 / 2)
 
 
 def _share(mean_pressure: Values, variance: Array) -> Array:
@@ -254,7 +254,7 @@ class Memory:
         self.shares = steady + (self.shares - steady) * np.exp(-duration / self.times - 1j * duration * omega)
 
     def _frequency(self, velocity: tuple[float, float]) -> Array:
-        return full_contact.frequency(self.rings.waves.kx, self.rings.waves.ky, *velocity)
+        return wavy.frequency(self.rings.waves.kx, self.rings.waves.ky, *velocity)
 
     def _steady(self, omega: Array) -> ComplexArray:
         phase = 1j * omega[:, None] * self.times

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from parcontact.theory.full_contact import Array, Values
+from parcontact.theory.wavy import Array, Values
 
 # JKR: sphere
 

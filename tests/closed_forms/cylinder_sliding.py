@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import i0e, i1e, k0e, k1e
 
-from parcontact.theory.full_contact import Array
+from parcontact.theory.wavy import Array
 
 from .quadrature import graded_rule
 

@@ -18,7 +18,7 @@ units and broadcast.
 import numpy as np
 from scipy.special import erfcx
 
-from parcontact.theory.full_contact import Array, Values
+from parcontact.theory.wavy import Array, Values
 
 NEAR = 1e-3  # accuracy: relative difference of a and b below which the limit is taken, to its square
 

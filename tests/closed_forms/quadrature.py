@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from parcontact.theory.full_contact import Array
+from parcontact.theory.wavy import Array
 
 
 @cache

@@ -1,6 +1,6 @@
 """Closed forms that only tests use: what follows a step of load, approach or velocity, and time steps of a code.
 
-The equations and their sources are those of `hertz`, `full_contact` and `westergaard` of `parcontact.theory`.
+The equations and their sources are those of `hertz` and `wavy` of `parcontact.theory`.
 """
 
 import numpy as np
@@ -15,18 +15,18 @@ from parcontact.physics.prony import (
     normal_form,
     relaxation,
 )
-from parcontact.theory.full_contact import (
+from parcontact.theory.hertz import _time_of_equal_radius
+from parcontact.theory.wavy import (
     Array,
     ComplexArray,
     ComplexValues,
     Values,
+    _fraction,
     _friction,
     frequency,
     pressure_amplitude,
     traction,
 )
-from parcontact.theory.hertz import _time_of_equal_radius
-from parcontact.theory.westergaard import _fraction
 
 from .quadrature import graded_rule
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from parcontact.physics.prony import Moduli, creep_spectrum
-from parcontact.theory.full_contact import Array
+from parcontact.theory.wavy import Array
 
 from .quadrature import graded_rule
 

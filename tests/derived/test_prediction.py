@@ -21,7 +21,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.results import info, prediction
 from parcontact.results.info import TheorySettings
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 ROUGH: dict[str, Any] = {
     "shape": "rough",
@@ -170,8 +170,8 @@ def test_full_contact_of_a_lattice_is_exact() -> None:
     one = job(surface=[{**WAVE, "waves": [3, 2]}, WAVE], history=[stage], initial=start)
     x, y = np.arange(16) / 16, np.arange(16)[:, None] / 16
     heights = 0.5e-6 * (np.cos(2 * np.pi * 4 * x) + np.cos(2 * np.pi * (3 * x + 2 * y)))
-    waves = full_contact.waves(heights, 1e-3, 1e-3)
-    exact = np.hypot(*full_contact.traction(*waves, complex_modulus(0.04 * waves.kx, *PRONY))) / 1e8
+    waves = wavy.waves(heights, 1e-3, 1e-3)
+    exact = np.hypot(*wavy.traction(*waves, complex_modulus(0.04 * waves.kx, *PRONY))) / 1e8
     for gamma in (0.0, 0.45):
         assert_allclose(predicted(one, gamma=gamma)[0].friction, exact, rtol=1e-10)
 

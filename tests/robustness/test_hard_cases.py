@@ -37,7 +37,7 @@ from parcontact.door.doctor import (
 )
 from parcontact.march.loop import March
 from parcontact.physics import prony
-from parcontact.theory import full_contact, hertz, westergaard
+from parcontact.theory import hertz, wavy
 
 from .strict_bench import StrictBench
 
@@ -264,11 +264,11 @@ def long_box(bench: Bench) -> None:
         job = wave([stage], points=(16, rows_of_points), grid={"points": [16, rows_of_points], "size": size})
         _, rows = bench.march(job)
         bench.expect("friction", rows[-1].measures.friction, float(mu), 1e-9)
-        mean = 0.5 * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+        mean = 0.5 * float(wavy.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
         grid = {"points": [128, rows_of_points], "size": size}
         _, rows = bench.march(wave([{"pressure": mean}], grid=grid))
         bench.expect("area", rows[-1].measures.contact_area, 0.5, 2 / 128, scale=1.0)
-        peak = westergaard.peak_pressure(mean, HEIGHT, WAVELENGTH, GLASSY)
+        peak = wavy.peak_pressure(mean, HEIGHT, WAVELENGTH, GLASSY)
         bench.expect("peak", rows[-1].measures.max_pressure, float(peak), 2e-3)
     stage = {"velocity": FAST, "duration": 2e-3, "time_step": 5e-4}
     tall = {"points": [3, 16], "size": [1e-4 * WAVELENGTH, WAVELENGTH]}
@@ -285,7 +285,7 @@ def reversal(bench: Bench) -> None:
     _, rows = bench.march(wave([stage], initial=start))
     t = np.array([row.time for row in rows])
     modulus = step_responses.velocity_step_modulus(t, K * FAST, np.array([-K * FAST]), *PRONY)
-    exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
+    exact = wavy.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
     found = np.array([row.measures.force_x for row in rows]) / MEAN / WAVELENGTH**2
     bench.expect_all("force", found, exact, 5e-3)
     bench.expect("at the instant", found[0], -9.7709e-4, 1e-5)
@@ -320,14 +320,14 @@ def stop(bench: Bench) -> None:
 
 def extreme_velocities(bench: Bench) -> None:
     """Far too slow: no friction, the area of the long-term modulus. Far too fast: of the modulus at once."""
-    mean = 0.5 * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, LONG_TERM))
+    mean = 0.5 * float(wavy.full_contact_pressure(HEIGHT, WAVELENGTH, LONG_TERM))
     for factor, modulus in ((1e-9, LONG_TERM), (1e9, GLASSY)):
         velocity = factor * FAST
         stage = {"pressure": mean, "velocity": velocity, "distance": WAVELENGTH / 16, "cells_per_step": 1}
         start = {"state": "steady", "velocity": velocity, "pressure": mean}
         _, rows = bench.march(wave([stage], points=(128, 1), initial=start))
-        area = float(westergaard.contact_fraction(mean, HEIGHT, WAVELENGTH, modulus))
-        peak = float(westergaard.peak_pressure(mean, HEIGHT, WAVELENGTH, modulus))
+        area = float(wavy.contact_fraction(mean, HEIGHT, WAVELENGTH, modulus))
+        peak = float(wavy.peak_pressure(mean, HEIGHT, WAVELENGTH, modulus))
         for row in (rows[0], rows[-1]):
             bench.expect("area", row.measures.contact_area, area, 2 / 128, scale=1.0)
             bench.expect("friction", row.measures.friction, 0.0, 1e-7, scale=K * HEIGHT)

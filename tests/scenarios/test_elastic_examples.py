@@ -23,7 +23,7 @@ import parcontact as pc
 from parcontact.contact import starts
 from parcontact.errors import RunError
 from parcontact.files.recorder import StepRow
-from parcontact.theory import hertz, westergaard
+from parcontact.theory import hertz, wavy
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
 WAVE = (5e-7, 2.5e-4, 1e6)  # amplitude [m], wavelength [m], shear modulus [Pa] of jobs/westergaard.yaml and waves.yaml
@@ -146,12 +146,12 @@ def test_johnson_area_corrected() -> None:
 def check_westergaard(row: StepRow, pressures: NDArray[Any], edge: float, wrong: float) -> None:
     """Each of the two edges of the contact to `edge` cells, and the pressures to `wrong` of the highest."""
     mean = row.measures.pressure
-    cells = X.size * (row.measures.contact_area - float(westergaard.contact_fraction(mean, *WAVE)))
+    cells = X.size * (row.measures.contact_area - float(wavy.contact_fraction(mean, *WAVE)))
     assert abs(cells) <= 2 * edge
-    expected = westergaard.pressure(X, mean, *WAVE)
+    expected = wavy.pressure(X, mean, *WAVE)
     assert np.abs(pressures - expected).max() <= wrong * expected.max()
     assert_allclose(row.measures.max_pressure, expected.max(), rtol=1e-3)
-    assert_allclose(row.measures.mean_gap, westergaard.mean_gap(mean, *WAVE), atol=1e-5 * WAVE[0])
+    assert_allclose(row.measures.mean_gap, wavy.mean_gap(mean, *WAVE), atol=1e-5 * WAVE[0])
 
 
 def test_westergaard() -> None:
@@ -160,15 +160,15 @@ def test_westergaard() -> None:
     assert len(steps) == 5
     for row, fields in steps:
         check_westergaard(row, fields["pressure"], 0.5, 0.01)
-        expected = westergaard.gap(X, row.measures.pressure, *WAVE)
+        expected = wavy.gap(X, row.measures.pressure, *WAVE)
         assert np.abs(fields["gap"] - expected).max() <= 1e-4 * WAVE[0]
-    closed = westergaard.pressure(X, steps[-1][0].measures.pressure, *WAVE)
+    closed = wavy.pressure(X, steps[-1][0].measures.pressure, *WAVE)
     assert np.abs(steps[-1][1]["pressure"] - closed).max() <= 1e-9 * closed.max()
 
 
 def test_westergaard_at_all_loads() -> None:
     """Each edge to one cell (measured 0.7). Where an edge falls just so, the pressure next to it misses 1.8 %."""
-    full = float(westergaard.full_contact_pressure(*WAVE))
+    full = float(wavy.full_contact_pressure(*WAVE))
     history = ", ".join(f"{{pressure: {share * full / 50}}}" for share in range(1, 50))
     for row, fields in run(JOBS / "westergaard.yaml", "grid.points=[1024, 1]", f"history=[{history}]"):
         check_westergaard(row, fields["pressure"], 1.0, 0.02)

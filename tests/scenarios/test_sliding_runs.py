@@ -19,7 +19,7 @@ from parcontact.files import tables
 from parcontact.files.recorder import StepRow
 from parcontact.march.loop import March
 from parcontact.physics.prony import Integrator
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 
 def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> StepRow:
@@ -224,7 +224,7 @@ def test_error_of_a_step_in_full_contact() -> None:
     assert errors is not None
     assert errors.friction is not None
     stepped = step_responses.discrete_friction_coefficient(*waves, CELL / FAST, *PRONY)
-    true = abs(float(stepped / full_contact.friction_coefficient(*waves, *PRONY)) - 1.0)
+    true = abs(float(stepped / wavy.friction_coefficient(*waves, *PRONY)) - 1.0)
     assert true < errors.friction.time < 3.0 * true
 
 

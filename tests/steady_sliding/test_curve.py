@@ -17,7 +17,7 @@ from parcontact.march.curve import request
 from parcontact.march.loop import run_steps
 from parcontact.parallel.fft import pyfftw
 from parcontact.parallel.slab import Slab
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 WAVE = """\
 grid: {points: [64, 4], size: [2.5e-4, 1.5625e-5]}
@@ -52,7 +52,7 @@ LAW = (2.75e5, np.array([2.475e6]), np.array([1.0e-3]))
 def friction_of_wave(pressure: float, speed: float) -> float:
     """The closed form for WAVE in full contact."""
     waves = (np.array([5.0e-7]), np.array([2 * np.pi / 2.5e-4]), np.array([0.0]))
-    return float(full_contact.friction_coefficient(pressure, *waves, speed, 0.0, *LAW))
+    return float(wavy.friction_coefficient(pressure, *waves, speed, 0.0, *LAW))
 
 
 @pytest.fixture

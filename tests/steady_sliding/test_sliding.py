@@ -20,7 +20,7 @@ from parcontact.march.point import Point
 from parcontact.march.scene import Setup
 from parcontact.march.steady import SteadySliding, stiffer_lines
 from parcontact.parallel.slab import Slab
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 FORCE = 0.15  # N
 CONTACT = (3 * FORCE * RADIUS / (16 * G0)) ** (1 / 3)  # a*, Hertz with the instantaneous modulus [m]
@@ -149,7 +149,7 @@ def test_full_contact_in_any_direction(shared_path: Path, comm: MPI.Intracomm, v
     amplitude = np.array([4.0e-7, 2.0e-7])
     kx, ky = 2 * np.pi * np.array([2, -1]) / 3.0e-4, 2 * np.pi * np.array([1, 3]) / 2.5e-4
     law, (vx, vy) = (np.array([2.0e6, 5.0e5]), np.array([1.0e-3, 1.0e-5])), velocity
-    exact = full_contact.friction_coefficient(2.0e6, amplitude, kx, ky, vx, vy, 3.0e5, *law)
+    exact = wavy.friction_coefficient(2.0e6, amplitude, kx, ky, vx, vy, 3.0e5, *law)
     power = -(point.measures.force_x * velocity[0] + point.measures.force_y * velocity[1])
     normal = point.measures.pressure * 3.0e-4 * 2.5e-4
     assert power / (np.hypot(*velocity) * normal) == pytest.approx(float(exact), rel=1e-9)  # along the velocity

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER, complex_modulus
 
 from parcontact.physics.prony import discrete_modulus
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 K, HEIGHT, MEAN = 2 * np.pi / 0.25e-3, 0.5e-6, 0.2e6  # wave number (rad/m), amplitude (m), mean pressure (Pa)
 ALONG, ACROSS = np.array([K]), np.array([0.0])  # kx and ky of one wave along x
@@ -31,11 +31,11 @@ STEADY = [
 def test_steady_table(row: tuple[float, ...]) -> None:
     """One wave along x that slides along it; printed to 5, 6 or 7 digits."""
     v, omega, storage, loss, size, phase, shift, *_ = row
-    frequency = full_contact.frequency(K, 0.0, v, 0.0)
+    frequency = wavy.frequency(K, 0.0, v, 0.0)
     assert_allclose(frequency, omega, rtol=4e-6)
     modulus = complex_modulus(frequency, *ZENER)
     assert_allclose([modulus.real, modulus.imag], [storage, loss], rtol=3e-7)
-    amplitude = full_contact.pressure_amplitude(HEIGHT, K, 0.0, modulus)
+    amplitude = wavy.pressure_amplitude(HEIGHT, K, 0.0, modulus)
     assert_allclose(abs(amplitude), size, rtol=3e-7)
     assert_allclose(-np.angle(amplitude), phase, rtol=3e-6)
     assert_allclose(-np.angle(amplitude) / K, 1e-6 * shift, rtol=4e-5)
@@ -58,21 +58,21 @@ def heights() -> np.ndarray:
 
 
 def test_waves_make_the_map(heights: np.ndarray) -> None:
-    amplitude, kx, ky = full_contact.waves(heights, LX, LY)
+    amplitude, kx, ky = wavy.waves(heights, LX, LY)
     x, y = LX / NX * np.arange(NX), LY / NY * np.arange(NY)[:, None]
     made = sum(np.real(a * np.exp(1j * (p * x + q * y))) for a, p, q in zip(amplitude, kx, ky, strict=True))
     assert_allclose(made, heights - heights.mean(), rtol=0, atol=1e-20)
 
 
 def test_waves_do_not_depend_on_the_mean(heights: np.ndarray) -> None:
-    lifted, lying = full_contact.waves(heights + 1.0, LX, LY), full_contact.waves(heights, LX, LY)
+    lifted, lying = wavy.waves(heights + 1.0, LX, LY), wavy.waves(heights, LX, LY)
     assert_allclose(lifted.amplitude, lying.amplitude, rtol=0, atol=1e-15)  # rounding of 1 m
-    assert full_contact.waves(np.ones((4, 6)), LX, LY).amplitude.size == 0
+    assert wavy.waves(np.ones((4, 6)), LX, LY).amplitude.size == 0
 
 
 def test_waves_refuse_two_points_per_period() -> None:
     with pytest.raises(ValueError, match="two points per period"):
-        full_contact.waves(np.tile([1.0, -1.0], (4, 4)), 1.0, 1.0)
+        wavy.waves(np.tile([1.0, -1.0], (4, 4)), 1.0, 1.0)
 
 
 def test_sums_over_waves_are_means_over_the_map(heights: np.ndarray) -> None:
@@ -85,22 +85,22 @@ def test_sums_over_waves_are_means_over_the_map(heights: np.ndarray) -> None:
     slopes = [np.fft.ifft2(1j * k * spectrum).real for k in (kx, ky)]
     traction = np.array([np.mean(p * slope) for slope in slopes])
 
-    waves = full_contact.waves(heights, LX, LY)
-    modulus = complex_modulus(full_contact.frequency(waves.kx, waves.ky, VX, VY), *TWELVE_DECADES)
-    assert_allclose(full_contact.traction(*waves, modulus), traction, rtol=1e-12)
+    waves = wavy.waves(heights, LX, LY)
+    modulus = complex_modulus(wavy.frequency(waves.kx, waves.ky, VX, VY), *TWELVE_DECADES)
+    assert_allclose(wavy.traction(*waves, modulus), traction, rtol=1e-12)
     assert_allclose(step_responses.pressure_variance(*waves, modulus), p.var(), rtol=1e-12)
-    mu = full_contact.friction_coefficient(MEAN, *waves, VX, VY, *TWELVE_DECADES)
+    mu = wavy.friction_coefficient(MEAN, *waves, VX, VY, *TWELVE_DECADES)
     assert_allclose(mu, -(traction @ [VX, VY]) / np.hypot(VX, VY) / MEAN, rtol=1e-12)
 
 
 def test_waves_across_the_velocity_give_no_friction() -> None:
     case = (HEIGHT, ACROSS, ALONG)
-    assert full_contact.friction_coefficient(MEAN, *case, 1.0, 0.0, *ZENER) == 0
-    assert full_contact.frequency(ACROSS, ALONG, 1.0, 0.0) == 0.0
+    assert wavy.friction_coefficient(MEAN, *case, 1.0, 0.0, *ZENER) == 0
+    assert wavy.frequency(ACROSS, ALONG, 1.0, 0.0) == 0.0
 
 
 def test_changing_sign_gives_no_friction() -> None:
     """A wave of two cells, one cell per step: its discrete modulus is real."""
     modulus = discrete_modulus(np.pi / 1e-4, 1e-4, *ZENER)
-    size = full_contact.traction(HEIGHT, np.array([np.pi / CELL]), np.array([0.0]), np.array([modulus]))
+    size = wavy.traction(HEIGHT, np.array([np.pi / CELL]), np.array([0.0]), np.array([modulus]))
     assert_allclose(size, 0, atol=1e-12 * MEAN)

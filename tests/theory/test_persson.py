@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER, complex_modulus
 from scipy.special import erf
 
-from parcontact.theory import full_contact, persson
-from parcontact.theory.full_contact import Waves
+from parcontact.theory import persson, wavy
 from parcontact.theory.persson import (
     Memory,
     Rings,
@@ -18,6 +17,7 @@ from parcontact.theory.persson import (
     rings_of_spectrum,
     rings_of_surface,
 )
+from parcontact.theory.wavy import Waves
 
 K_LONG, K_SHORT, SLOPE = 2 * np.pi * 4 / 1e-3, 2 * np.pi * 128 / 1e-3, 0.02  # rad/m, rad/m, root mean square
 PRESSURE = 0.1e6  # Pa
@@ -55,13 +55,13 @@ def test_full_contact_is_exact(gamma: float, direction: float) -> None:
     heights = 1e-6 * np.random.default_rng(3).standard_normal((8, 8))
     kept = np.fft.fft2(heights)
     kept[4], kept[:, 4] = 0.0, 0.0
-    waves = full_contact.waves(np.fft.ifft2(kept).real, 1e-3, 1e-3)
+    waves = wavy.waves(np.fft.ifft2(kept).real, 1e-3, 1e-3)
     rings = rings_of_surface(waves)
     vx, vy = 0.3 * np.cos(direction), 0.3 * np.sin(direction)
-    modulus = complex_modulus(full_contact.frequency(rings.waves.kx, rings.waves.ky, vx, vy), *TWELVE_DECADES)
+    modulus = complex_modulus(wavy.frequency(rings.waves.kx, rings.waves.ky, vx, vy), *TWELVE_DECADES)
     pressure = 10 * float(np.sqrt(step_responses.pressure_variance(*rings.waves, modulus)))
     found = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
-    expected = full_contact.friction_coefficient(pressure, *waves, vx, vy, *TWELVE_DECADES)
+    expected = wavy.friction_coefficient(pressure, *waves, vx, vy, *TWELVE_DECADES)
     assert_allclose(found, expected, rtol=1e-13)
     assert persson.contact_area(pressure, rings, modulus) == 1.0
 
@@ -90,7 +90,7 @@ def memory() -> Memory:
 
 
 def frequencies(memory: Memory, velocity: tuple[float, float]) -> np.ndarray:
-    return full_contact.frequency(memory.rings.waves.kx, memory.rings.waves.ky, *velocity)
+    return wavy.frequency(memory.rings.waves.kx, memory.rings.waves.ky, *velocity)
 
 
 def test_load_rest_slide(memory: Memory) -> None:

@@ -23,7 +23,7 @@ from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.results import band_charts
 from parcontact.rubber.shift import WLF, Factors, highest_temperature
-from parcontact.theory import full_contact
+from parcontact.theory import wavy
 
 C1, C2, REFERENCE = 17.4, 51.6, 20.0
 WAVE = f"""\
@@ -64,7 +64,7 @@ def test_friction_of_a_wave_at_each_temperature(tmp_path: Path) -> None:
         sliding.set_temperature(temperature)
         point = sliding.solve((0.03, 0.0), 2.0e5)
         law = (2.75e5, np.array([2.475e6, 1.0e6]), factor(temperature) * np.array([1.0e-3, 2.0e-2]))
-        exact = float(full_contact.friction_coefficient(2.0e5, *wave, 0.03, 0.0, *law))
+        exact = float(wavy.friction_coefficient(2.0e5, *wave, 0.03, 0.0, *law))
         assert point.measures.friction == pytest.approx(exact, rel=1e-8)
         assert point.shift_factor == pytest.approx(factor(temperature), rel=1e-12)
 

@@ -1,7 +1,19 @@
-"""A rigid rough surface in full contact with a viscoelastic half-space on which it slides.
+"""Rigid wavy surfaces on a half-space: one wave on an elastic body, and many waves in full contact.
 
-The problem is linear, so that the solution is exact.
+One wave, h(x) = Delta cos(2 pi x/lambda), is in partial or full contact with an elastic half-space (Westergaard). Its
+crests are at x = 0, ±lambda, ..., and p is the mean pressure. Contact is complete at p* = pi E* Delta/lambda. With
+s = min(p/p*, 1), psi = pi x/lambda and E* = 2 G/(1 - nu):
 
+    contact fraction  f = (2/pi) asin sqrt(s)
+    pressure          p(x) = 2 p* |cos psi| sqrt(s - sin^2 psi)_+               p + p* cos(2 psi) in full contact
+    gap               g(x) = 2 Delta (y sqrt(y^2 - s) - s arcosh(y/sqrt(s))),   y = |sin psi| > sqrt(s)
+    mean gap          Delta (1 - s + s ln s)
+
+Source: H. M. Westergaard, J. Appl. Mech. 6 (1939) 49; K. L. Johnson, Contact Mechanics (1985), section 13.2. The gap
+is the integral of its slope outside the contact; the mean gap d follows from the elastic energy U per area, dU = -p dd.
+Arguments are in SI units and broadcast.
+
+Many waves slide in full contact with a viscoelastic half-space. This problem is linear, so that its solution is exact.
 The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
 Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
 of time after a change of velocity, and also a function of the time step for a time-stepping code. With k = |(kx, ky)|:
@@ -28,6 +40,71 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Values = float | Array
 ComplexValues = complex | Array | ComplexArray
+
+
+def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
+    """Return p* = pi E* Delta/lambda [Pa], the mean pressure at which contact becomes complete."""
+    modulus = 2 * shear_modulus / (1 - poisson)
+    return np.asarray(np.pi * modulus * amplitude / wavelength)
+
+
+def contact_fraction(
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
+) -> Array:
+    """Return the share in contact, f = 2a/lambda = (2/pi) asin sqrt(p/p*)."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    return _fraction(load)
+
+
+def pressure(
+    x: Values,
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """Return p(x) [Pa] at distances x [m] from a crest; any x."""
+    full = full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    psi = np.pi * x / wavelength
+    inside = np.maximum(mean_pressure / full - np.sin(psi) ** 2, 0)
+    partial = 2 * full * np.abs(np.cos(psi)) * np.sqrt(inside)
+    return np.asarray(np.where(mean_pressure < full, partial, mean_pressure + full * np.cos(2 * psi)))
+
+
+def peak_pressure(
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
+) -> Array:
+    """Return p(0) [Pa]: 2 sqrt(p p*) in partial contact, p + p* in full contact."""
+    return pressure(0.0, mean_pressure, amplitude, wavelength, shear_modulus, poisson)
+
+
+def gap(
+    x: Values,
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """Return g(x) [m], the distance between the surfaces; 0 in contact."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    edge = np.sqrt(np.clip(load, np.finfo(float).tiny, 1))
+    y = np.maximum(np.abs(np.sin(np.pi * x / wavelength)), edge)
+    return np.asarray(2 * amplitude * (y * np.sqrt((y - edge) * (y + edge)) - edge**2 * np.arccosh(y / edge)))
+
+
+def mean_gap(
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
+) -> Array:
+    """Return the mean gap over one wave [m], Delta (1 - s + s ln s) with s = p/p*."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    s = np.clip(load, np.finfo(float).tiny, 1)
+    return amplitude * (1 - s + s * np.log(s))
+
+
+def _fraction(load: Values) -> Array:
+    return np.asarray(2 / np.pi * np.arcsin(np.sqrt(np.clip(load, 0, 1))))
 
 
 class Waves(NamedTuple):
@@ -61,9 +138,6 @@ def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
     return np.asarray(kx * vx + ky * vy)
 
 
-# from transfer moduli to pressure and friction
-
-
 def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> ComplexArray:
     """Return 2 k A conj(M) [Pa]: amplitude and phase of each wave of pressure relative to the moving surface; `modulus`
     is the transfer modulus M."""
@@ -75,9 +149,6 @@ def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexV
     waves."""
     strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
     return -np.stack([np.sum(strength * kx, axis=-1), np.sum(strength * ky, axis=-1)], axis=-1)
-
-
-# steady sliding
 
 
 def friction_coefficient(
