@@ -34,7 +34,7 @@ class Job(Part):
     title: str = Field(default="", description="text (put numbers in quotes)")
     grid: Grid = Field(description="a mapping with points and size")
     surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
-    material: Material = Field(description="a mapping with model: elastic | zener")
+    material: Material = Field(description="a mapping with model: elastic | zener | dma")
     initial: Initial = Initial()
     history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
     numerics: Numerics = Numerics()

@@ -374,7 +374,7 @@ def log_range(text: str) -> tuple[float, ...]:
 def bounded(value: float) -> float:
     """Return a number; refuse one that would overflow in a run, in squares of slopes or quotients of lengths."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
-        refuse(Fault(f"must be zero, or from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
+        refuse(Fault(f"must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value
 
 

@@ -145,7 +145,7 @@ class Scenery(Part):
 
     surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
     initial: Initial = Initial()
-    material: Material = Field(description="a mapping with model: elastic | zener")
+    material: Material = Field(description="a mapping with model: elastic | zener | dma")
     history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
     steady: Steady | None = None
     numerics: Numerics = Numerics()

@@ -84,6 +84,7 @@ SURFACES = {
 }
 
 MATERIALS = {
+    "material:": "3:10: material is missing; it must be a mapping with model: elastic | zener | dma",
     "material: {shear_modulus: 1}": "3:11: material.model is missing; it must be elastic | zener | dma",
     "material: {model: elastc}": (
         "3:19: material.model must be elastic | zener | dma, got 'elastc'; did you mean elastic?"
