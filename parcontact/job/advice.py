@@ -1,18 +1,21 @@
 """Warnings about the mesh, the box and the time steps of a job, and the mesh that an accuracy needs.
 
-A mesh needs enough cells per shortest wave of the surface, along and across the sliding direction.
+The errors of friction and of the contact area depend on the number of cells per shortest wave of the surface, along and
+across the sliding direction.
 
-The mesh causes two kinds of errors of friction and contact area, both at edges of contact. Systematic errors grow with
-the phase of the modulus, because the pressure at one edge of a spot is steeper than at the other. Random errors come
-from the positions of edges between points: with a share A in contact, the relative standard deviation at one place is
-((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 places. `friction_error` and `area_error` add
-both; random errors, and the scatter of systematic errors between surfaces, count SURE standard deviations.
+The mesh causes two kinds of errors, both at edges of contact. Systematic errors grow with the phase of the modulus,
+because the pressure at one edge of a spot is steeper than at the other. Random errors come from the positions of edges
+between points. If a share A of the surface is in contact, their relative standard deviation in a square with sides of
+one shortest wave is ((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 such squares.
+`friction_error` and `area_error` are sums of both kinds, with SURE standard deviations of the random errors and of the
+differences of systematic errors between surfaces.
 
-The constants were fitted by maximum likelihood, with share and phase as guessed by `march.mesh`. Data are steady states
-of rough surfaces of 1 to 100 % contact with 12 or 24 shortest waves along a side: for friction 36 states on about 110
-meshes each, for the area 24 states on about 40 meshes, with references of 160 cells per shortest wave. Fewer waves
-count as 12. `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is
-hypot(x dx, y dy) long. Without sliding both axes count as along the sliding direction.
+The constants were fitted by maximum likelihood to steady states of rough surfaces, with the share in contact and the
+phase that `march.mesh` guesses. Between 1 and 100 % of these surfaces were in contact, and 12 or 24 shortest waves lay
+along a side; a surface with fewer waves is treated as one with 12. There were 36 states for friction, each on about 110
+meshes, and 24 states for the area, each on about 40 meshes; the references had 160 cells per shortest wave.
+`scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is hypot(x dx, y dy)
+long. Without sliding both axes are treated as along the sliding direction.
 
 Warnings about physics are in `meaning.py`, about memory in `limits.py`.
 """
@@ -47,7 +50,7 @@ class Sections(Protocol):
 
     @property
     def origin(self) -> Origin:
-        """Return the origin of the job."""
+        """Return the file, the included materials and the places of keys from which the job was read."""
 
     @property
     def directions(self) -> list[Vector]:
@@ -55,14 +58,14 @@ class Sections(Protocol):
 
     @property
     def sheared_first(self) -> bool:
-        """Return True if an effect shears the contact before it slides."""
+        """Return True if an effect, such as sticking, shears the contact before the surface slides over it."""
 
     @property
     def remembers(self) -> bool:
         """Return True if the result depends on the history."""
 
     def asked(self, name: str) -> list[Any]:
-        """Return the attribute `name` of each effect whose section the job has."""
+        """Return the attributes called `name` of the classes of effects whose sections the job has."""
 
 
 Vector = tuple[float, float]
@@ -83,9 +86,13 @@ SAME_LENGTH = 1e-9  # rounding: relative difference below which numbers are the 
 
 
 class Guess(NamedTuple):
-    """A guess of the contact before it is solved: `share` in contact, `phase` of the modulus at the frequency of edges
-    [units of 90 degrees], number of shortest `waves` along a side of the box, and slowness of sliding `slow` (0 to
-    1)."""
+    """A guess of the contact before it is solved.
+
+    `share` is the share of the surface in contact. `phase` is the phase of the modulus, over 90 degrees, at the
+    frequency at which edges of contact pass. `waves` is the number of shortest waves along a side of the box. `slow` is
+    1 for sliding far below all frequencies of the body, where edges lose power in waves shorter than the cells, and 0
+    for fast sliding.
+    """
 
     share: float
     phase: float
@@ -99,14 +106,16 @@ class Guess(NamedTuple):
 
     @property
     def few(self) -> float:
-        """Return the ratio of random errors to their value in a box of FEW waves."""
+        """Return the random errors over those of a box with FEW shortest waves along a side; at most 1."""
         return FEW / max(self.waves, FEW)
 
 
 def friction_error(c: float, across: float, guess: Guess) -> float:
-    """Return the relative error of friction that nine of ten surfaces keep with `c` cells per shortest wave along the
-    sliding and `across` cells across. Slow sliding adds the power lost in waves shorter than the cells; the last term
-    matters only for few cells."""
+    """Return the relative error of friction below which nine of ten surfaces stay.
+
+    `c` and `across` are the numbers of cells per shortest wave along and across the sliding direction. Slow sliding
+    adds the power that is lost in waves shorter than the cells.
+    """
     along = (4.0 / c) ** 1.5
     steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
     counted = math.hypot((4.0 / c) ** 2.15, 0.13 * (4.0 / across) ** 2.7)
@@ -116,9 +125,9 @@ def friction_error(c: float, across: float, guess: Guess) -> float:
 
 
 def area_error(c: float, across: float, guess: Guess) -> float:
-    """Return the relative error of the corrected contact area that nine of ten surfaces keep; arguments as in
-    `friction_error`. The correction is too large for elastic bodies, and too small at edges across the sliding of
-    viscoelastic bodies."""
+    """Return the relative error of the contact area, corrected for cells at its edges, below which nine of ten surfaces
+    stay; the arguments are those of `friction_error`. Errors remain as the correction is too large for elastic bodies,
+    and too small for viscoelastic bodies at edges across the sliding direction."""
     along, aside = 4.0 / c, 4.0 / across
     known = 0.067 * guess.phase * along - 0.005 * (along + aside)
     chance = guess.few * 0.0078 * math.hypot(along**1.2, 0.7 * aside**1.6)
@@ -126,17 +135,18 @@ def area_error(c: float, across: float, guess: Guess) -> float:
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
-    """Return the time in which the surface slides by one cell [s]."""
+    """Return the time in which the surface slides by one cell [s]; the stage must have a velocity."""
     return along(stage.velocity, stage.speed, grid) / stage.speed
 
 
 def along(way: Vector, length: float, grid: Grid) -> float:
-    """Return the length of a cell [m] along the vector `way`, whose length is given."""
+    """Return the length of a cell [m] along the direction of the vector `way`, which has the length `length`."""
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
 def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
-    """Return True if a grid has a wave between the `shortest` and the `longest` wavelength [m]."""
+    """Return True if a grid resolves a wave, in any direction, between the `shortest` and the `longest` wavelength
+    [m]."""
     least, most = (1 - SAME_LENGTH) / longest, (1 - SAME_LENGTH) / shortest
     rows = (grid.ny - 1) // 2
     for column in range(min(grid.nx // 2, int(most * grid.lx)) + 1):
@@ -148,18 +158,21 @@ def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
 
 
 def cells_per_wave(accuracy: float) -> int:
-    """Return the cells per shortest wave along the sliding that friction needs for an `accuracy`."""
+    """Return the cells per shortest wave along the sliding direction that keep the relative error of friction below
+    `accuracy`."""
     return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME_LENGTH)))
 
 
 def cells_for_area(accuracy: float) -> float:
-    """Return the cells per shortest wave along the sliding that the contact area needs for an `accuracy`."""
+    """Return the cells per shortest wave along the sliding direction that keep the relative error of the contact area
+    below `accuracy`."""
     return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
 
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
-    """Return the cells per shortest wave along an axis that friction and the contact area need, for a surface that
-    slides along `directions` (unit vectors); without sliding, twice the number for the area."""
+    """Return the cells per shortest wave along an axis (0 for x, 1 for y) that friction, and that the contact area,
+    needs for the accuracies `asked`. The surface slides along `directions` (unit vectors); without any, both numbers
+    are those of the area."""
     if not directions:
         return cells_for_area(asked.area), cells_for_area(asked.area)
     if any(abs(way[axis]) > ASIDE for way in directions):
@@ -189,7 +202,8 @@ def more_points(grid: Grid) -> str:
 
 
 def fast_length(least: float) -> int:
-    """Return the smallest multiple of MULTIPLE, at least `least`, whose other prime factors are 2, 3 and 5."""
+    """Return the smallest number of points, at least `least`, that makes Fourier transforms fast: MULTIPLE times a
+    number whose prime factors are 2, 3 and 5."""
     count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME_LENGTH)))
     while 60 ** count.bit_length() % count:  # 60 = 2 * 2 * 3 * 5
         count += 1
@@ -199,9 +213,12 @@ def fast_length(least: float) -> int:
 def choose_points(
     wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
 ) -> tuple[int, int]:
-    """Return the numbers of points along x and y of the smallest mesh that meets the accuracies `asked`, for a surface
-    with this shortest wave [m] that slides along `directions` (unit vectors), or does not slide. Of equally large
-    meshes, the mesh with the shortest longer side is returned."""
+    """Return the numbers of points along x and y of the smallest mesh that meets the accuracies `asked`.
+
+    The surface has the shortest wave `wave` [m] in a box of `size` [m], and slides along `directions` (unit vectors),
+    or not at all. The mesh meets the accuracies for all `guesses` of the contact. Of equally large meshes, the mesh
+    whose longer side has the fewest points is returned.
+    """
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
     x, y = (wave / length for length in size)
@@ -240,7 +257,8 @@ SEED_FRICTION, SEED_AREA = 0.24, 0.17
 
 
 def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:
-    """Yield warnings about mesh, box and time steps, section by section, but not about a mesh chosen for the job."""
+    """Yield warnings about mesh, box and time steps, section by section, but not about a mesh that the program chose
+    (`points: auto`)."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
@@ -285,7 +303,8 @@ WARN_LARGE_BOX = Kind(
 
 
 def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
-    """Yield a warning about a box that is longer than MOST_LONG_WAVES longest waves."""
+    """Yield a warning about a box whose length is MOST_LONG_WAVES times the longest wave of a shape or more; `index` is
+    the place of the shape in the list of the surface."""
     length = max((length for _, length, _ in _directions(grid)), default=0.0)
     if length > MOST_LONG_WAVES * shape.long_wavelength:
         of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}
@@ -312,8 +331,10 @@ WARN_FEW_CELLS_OF_A_MAP = Kind(
 def doubt_measured_waves(
     grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector], spiky: bool = False
 ) -> Iterator[Doubt]:
-    """Yield a warning about the shortest wave [m] of a measured surface that slides along `directions`; outliers of a
-    `spiky` surface may shorten it."""
+    """Yield a warning if a measured surface, which slides along `directions`, has too few cells per shortest wave.
+
+    `wave` [m] is the length of this wave. The warning of a `spiky` surface says that outliers may have shortened it.
+    """
     spikes = ", which has outliers" if spiky else ""
     for numbers in _few_cells(wave, grid, asked, directions):
         yield WARN_FEW_CELLS_OF_A_MAP("surface", {**numbers, "known": wave, "spikes": spikes})
@@ -345,7 +366,8 @@ def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Ve
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
-    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 for `time_step: auto`."""
+    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 for `time_step: auto`, whose
+    steps need no warning."""
     step = stage.time_step
     if step == AUTO:
         return 0.0
@@ -386,7 +408,8 @@ def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float |
 
 
 def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
-    """Return a sentence on the scatter of friction (if it `slides`) and contact area between seeds; '' without a seed.
+    """Return a sentence on how much the contact area, and friction if the surface `slides`, differ between seeds of the
+    surface; '' for a surface without a seed.
 
     The scatter falls with the square root of the number of longest waves in the box.
     """

@@ -1,7 +1,4 @@
-"""Sections of a job on the calculation: `grid`, `numerics`, `output`, `checkpoint`, `study`, `bands`.
-
-`bands` cuts the spectrum of a surface into bands, each solved on a grid of its own.
-"""
+"""Sections of a job on the calculation: `grid`, `numerics`, `output`, `checkpoint`, `study` and `bands`."""
 
 from __future__ import annotations
 
@@ -121,7 +118,7 @@ FRACTION: TypeAdapter[float] = TypeAdapter(Fraction)
 
 
 class Accuracy(Part):
-    """Accepted relative errors of friction and of the corrected contact area."""
+    """The relative errors of friction and of the corrected contact area that the user accepts."""
 
     friction: Fraction = Field(default=1e-2, description="an error of friction [-] above 0 and below 1")
     area: Fraction = Field(default=1e-2, description="an error of the contact area [-] above 0 and below 1")
@@ -137,8 +134,8 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """Return the relative error of friction that time steps may cause; the area then has at most a quarter of this
-        error."""
+        """Return the relative error of friction that time steps may cause. Steps cause at most a quarter of this error
+        in the area, so that the accuracy of the area limits it, too."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 
@@ -149,8 +146,8 @@ def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
 
 
 class Numerics(Part):
-    """Settings of the solution; `accuracy` chooses `tolerance` and `branch_error` unless they are given, and the mesh
-    of `points: auto`."""
+    """Settings of the solution. The values of `tolerance` and `branch_error`, if they are not given, and the mesh of
+    `points: auto` follow from `accuracy`."""
 
     accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
         Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1, or {friction, area}")
@@ -178,7 +175,7 @@ class Numerics(Part):
 
     @property
     def chosen(self) -> dict[str, float]:
-        """Return the values that the program chose by the accuracy, by key."""
+        """Return the values that follow from `accuracy`, in a mapping by their keys."""
         return self._chosen
 
     @property
@@ -235,7 +232,7 @@ class Checkpoint(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Return `data` with checkpoints every 10 minutes by default."""
+        """Return the keys of the section; without an interval, with one of 10 minutes."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 
 
@@ -249,7 +246,8 @@ def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 class Study(Part):
-    """Lists of values (ladders) for `parcontact study`; a missing ladder is the single value of the job."""
+    """Values that `parcontact study` compares: a list of values of a setting is a ladder. A setting without a ladder
+    keeps the value of the job."""
 
     mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of positive whole numbers of points along x"

@@ -1,10 +1,10 @@
 """The history of a job as steps, given or chosen.
 
-Given steps have a constant length or grow by a constant factor: they follow from the job and their number, so that a
-restart needs only the number of the last step. Stages may choose their own steps, within bounds: the next step is
-decided after the one before has been made (`march.controller`). Chosen steps are stored, so that steps have numbers and
-a run can restart. Future steps are estimated: they double from the shortest to the longest allowed length and then stay
-constant.
+Given steps have a constant length or grow by a constant factor. They follow from the job and their number, so that a
+restart needs only the number of the last step. In stages with `time_step: auto` the run chooses the steps: the length
+of the next step is decided after a step has been made, between a shortest and a longest length (`march.controller`).
+Chosen steps are stored, so that steps have numbers and a run can restart. Future steps are estimated: they double from
+the shortest to the longest length and then stay constant.
 """
 
 import math
@@ -39,15 +39,16 @@ def reached(time: float, until: float) -> bool:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Shortest and longest step of a stage that chooses its own [s]."""
+    """The shortest and the longest length of a chosen step [s]."""
 
     least: float
     most: float
 
 
 def most_cells(job: Sections) -> int:
-    """Return the largest number of cells that a step may slide: the largest power of two up to a quarter of the
-    shortest wave; one if a quarter wave is shorter than a cell, or if a file may have any wave."""
+    """Return the largest number of cells by which the surface may slide in a step: the largest power of two up to a
+    quarter of the shortest wave; 1 if a quarter wave is shorter than a cell, or if waves are not known, as of a file of
+    heights."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
     for shape in job.surface:
@@ -61,15 +62,16 @@ def most_cells(job: Sections) -> int:
 
 
 def longest_change(stage: Stage) -> float:
-    """Return the longest step [s] that still follows the change of the load, or the phase of an oscillation."""
+    """Return the longest step [s] in which a ramp of the load, or the phase of an oscillation, changes little enough;
+    the whole stage without either."""
     if stage.frequency:
         return 1.0 / (CYCLE_STEPS * stage.frequency)
     return stage.seconds if stage.constant else stage.seconds / RAMP_STEPS
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """Return the limits on steps of a stage: while it slides, at most `cells` cells; at rest, at most the whole
-    stage."""
+    """Return the limits on the steps of a stage. The longest step is at most the whole stage, and for a sliding surface
+    the time in which it slides by `cells` cells."""
     most = longest_change(stage)
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
@@ -81,7 +83,7 @@ def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
 
 @dataclass(frozen=True)
 class StepLadder:
-    """Steps that double from `first` to `most` [s] and then stay constant, for `seconds`."""
+    """Steps whose length doubles from `first` to `most` [s] and then stays constant, until `seconds` have passed."""
 
     first: float
     most: float
@@ -110,10 +112,11 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class ChosenEnds:
-    """Ends of the steps of a stage: the steps `made` [s after its start], followed by the estimate `ladder`.
+    """Ends of the chosen steps of a stage: of the steps `made` [s after the start of the stage], then of the estimated
+    steps `ladder`.
 
-    The stage ends at the first of `stops` [s]; a second one is the end of a run that continues the stage. Steps also
-    end with each `part` of a cycle [s], if it is not 0.
+    `stops` [s after the start of the stage] are the end of the stage and, if the run continues beyond it, the end of
+    the run. In oscillations a step also ends with each `part` of a cycle [s], which is 0 without oscillation.
     """
 
     made: Sequence[float]
@@ -151,8 +154,8 @@ class ChosenEnds:
 
 
 class MadeStep(NamedTuple):
-    """An accepted step of a stage that chooses its steps: number of the stage, end of the step [s after the start of
-    the stage], and length of the next step [s]."""
+    """An accepted step whose length was chosen: number of the stage, end of the step [s after the start of the stage],
+    and length of the next step [s]."""
 
     stage: int
     end: float
@@ -161,8 +164,9 @@ class MadeStep(NamedTuple):
 
 @dataclass
 class ChosenSteps:
-    """The steps that stages have chosen so far: `ends` [s after the start of the stage] by the number of the stage, and
-    the length of the `next` step [s], 0 if undecided. No step slides by more than `cells`."""
+    """The steps chosen so far: `ends` has the ends of the steps of each stage [s after the start of the stage], by the
+    number of the stage; `next` is the length of the next step [s], 0 before it is decided. The surface slides by at
+    most `cells` cells in a step."""
 
     cells: int = 1
     ends: dict[int, list[float]] = field(default_factory=dict)
@@ -189,7 +193,8 @@ class ChosenSteps:
         return sum(map(len, self.ends.values()))
 
     def of_stage(self, index: int, stage: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
-        """Return the steps of a stage that may continue to `until` [s after its start]."""
+        """Return the steps of the stage with the number `index`; a run may continue the stage beyond its end, until
+        `until` [s after its start]."""
         made, limits = self.ends.get(index, []), bounds(stage, grid, self.cells)
         stops = (stage.seconds, *([until] if not reached(stage.seconds, until) else []))
         now = made[-1] if made else 0.0
@@ -200,7 +205,7 @@ class ChosenSteps:
         return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits, part)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
-        """Return all data of the chosen steps with units, by their names in checkpoints."""
+        """Return the data that a checkpoint stores: for each name of a data set its numbers and their unit."""
         stages = sorted(self.ends)
         return {
             "stages": ([float(stage) for stage in stages], "1"),
@@ -211,7 +216,7 @@ class ChosenSteps:
 
 
 def describe_steps(job: Sections) -> str:
-    """Return a text on the stages that choose their own time steps, with the reason; '' if there are none."""
+    """Return a text on the stages with chosen time steps, and on what determines these steps; '' if there are none."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
         return ""
@@ -227,9 +232,10 @@ def describe_steps(job: Sections) -> str:
 
 @dataclass(frozen=True)
 class GivenEnds:
-    """Ends of `count` steps as fractions of a stage of `seconds`, each `growth` times as long as the one before.
+    """Ends of the `count` steps of a stage that lasts `seconds`, as fractions of the stage. Each step is `growth` times
+    as long as the step before it.
 
-    The last fraction is 1; further steps have the length of the last one.
+    The last step ends at 1. Steps beyond the end of the stage are as long as its last step.
     """
 
     count: int
@@ -269,9 +275,12 @@ class GivenEnds:
 
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
-    """Return the steps of a stage: no step exceeds the requested length, and an instantaneous stage has none. Automatic
-    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp. Cycles of an
-    oscillation consist of equal steps, which also end at both turns."""
+    """Return the steps of a stage, none of which exceeds the requested length; a stage without duration has no steps.
+
+    Without a requested length, as for a body without memory, the surface slides by one cell in a step, a rest is one
+    step, and a ramp has RAMP_STEPS steps. Cycles of an oscillation consist of equal steps, some of which end at the
+    highest and at the lowest load.
+    """
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)
     if stage.cycles is not None and not isinstance(stage.time_step, GeometricStep):
@@ -297,12 +306,14 @@ SAME_PLACE = 1e-6  # accuracy: deviation from a displacement of whole cells that
 
 
 class Step(NamedTuple):
-    """One solve: it ends at `time` [s], `dt` [s] after the last, with the surface at `position` [m].
+    """A time step, with one solve of the contact at its end: at the `time` [s], `dt` [s] after the end of the step
+    before, with the surface at `position` [m].
 
-    `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt of
-    the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that this one
-    replaces. `decide`, for a step that may be too long, takes the error of the step and the motion of the edge of a
-    contact that attracts, in half process zones; it returns a shorter step to make instead, or the record of this step.
+    A step with dt = 0 is a jump of the load. `control` names the kind of the `load` (Pa, N or m). `growth` is dt over
+    the dt of the step before, and 0 after a jump: results are extrapolated by this factor. `passed` is the number of
+    further steps that this step replaces. `decide` exists for a step that may be too long. Its arguments are the error
+    of the step and, with adhesion, the motion of the edge of the contact over half the width of the zone in which
+    surfaces separate. It returns a shorter step to make instead, or the record of this step.
     """
 
     number: int
@@ -324,10 +335,10 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Span:
-    """The steps of one stage: a jump if `jumps`, and `count` steps with a duration, after `before` steps of the
-    history.
+    """The steps of one stage: a jump of the load if `jumps` is True, then `count` steps with a duration.
 
-    The stage starts at `start` [s], with the surface at `origin` [m].
+    `before` is the number of steps of the history before the stage. The stage starts at `start` [s], with the surface
+    at `origin` [m].
     """
 
     index: int
@@ -345,18 +356,19 @@ class Span:
 
     @property
     def moves(self) -> bool:
-        """True if the surface slides."""
+        """Return True if the surface slides."""
         return self.count > 0 and any(self.stage.velocity)
 
     @cached_property
     def rests(self) -> bool:
-        """True if the surface rests under a constant load, and the length of steps is free."""
+        """Return True if the surface rests under a constant load in steps that need not have equal lengths."""
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.constant
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """First and last step with a duration [s]; for chosen steps, the shortest and the longest."""
+        """Return the lengths of the first and of the last step with a duration [s]; for chosen steps the shortest and
+        the longest length."""
         if isinstance(self.ends, ChosenEnds):
             return self.ends.limits.least, self.ends.limits.most
         return self.ends.interval(1), self.ends.interval(self.count)
@@ -372,7 +384,8 @@ class Span:
         return x + along_x * slid, y + along_y * slid
 
     def place(self, number: int) -> int:
-        """Return the index of step `number` of the history among the stage's steps with a duration; 0 is the jump."""
+        """Return the index among the stage's steps with a duration, counted from 1, of the step with this number in the
+        history; 0 for the jump."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
@@ -404,12 +417,12 @@ class Span:
 class Timeline:
     """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are stored, not their steps.
 
-    If the history ends before `until`, its last stage continues with its last time step, velocity and load, to the
-    first step that reaches `until`; a stage of a single solve cannot continue. `pressure` [Pa] belongs to the initial
-    state, None at rest.
+    If the history ends before `until` [s], its last stage continues to the first step that reaches `until`, with the
+    time step, velocity and load at its end; a stage without duration cannot continue. `pressure` [Pa] is that of an
+    initial state in sliding, None for a body at rest.
 
-    `chosen` has the steps of stages that choose their own, and grows during a run; further steps are estimated. If
-    `chosen` is None, these stages have the steps of a body without memory.
+    `chosen` has the steps that a run has chosen in stages with `time_step: auto`, and grows during the run; further
+    steps are estimated. If it is None, these stages have the steps of a body without memory.
     """
 
     def __init__(
@@ -435,7 +448,7 @@ class Timeline:
 
     @property
     def spans(self) -> list[Span]:
-        """The steps of each stage, including the steps chosen so far."""
+        """Return the steps of each stage, including the steps chosen so far."""
         chosen = self.chosen.count if self.chosen is not None else 0
         if chosen != self._seen:
             del self._spans[self._open :]
@@ -492,22 +505,22 @@ class Timeline:
         return (self[number] for number in range(1, len(self) + 1))
 
     def span(self, number: int) -> Span:
-        """Return the stage with its steps that holds the step `number`."""
+        """Return the steps of the stage to which the step with this number belongs."""
         return self.spans[bisect_left(self.spans, number, key=lambda span: span.last)]
 
     @property
     def end(self) -> float:
-        """End of the last step [s]."""
+        """Return the end of the last step [s]."""
         return self[len(self)].time if len(self) else 0.0
 
     @property
     def lasts(self) -> bool:
-        """True if there are steps with a duration."""
+        """Return True if there are steps with a duration."""
         return any(span.count for span in self.spans)
 
     @property
     def moves(self) -> bool:
-        """True if the surface moves."""
+        """Return True if the surface moves."""
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:
@@ -515,12 +528,13 @@ class Timeline:
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """Return the number of first steps that agree with another history, stage by stage."""
+        """Return the number of steps in the first stages, as many as are equal in both histories."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 
     def first_between_cells(self) -> Step | None:
-        """Return the first step after which the surface is not displaced by whole cells along x, or None."""
+        """Return the first step after which the surface is not displaced by a whole number of cells along x and not at
+        all along y; None if there is no such step."""
         for span in filter(lambda span: span.moves, self.spans):
             first = span.before + span.jumps + 1
             if isinstance(span.ends, ChosenEnds):

@@ -1,7 +1,7 @@
 """Limits of a job: rules that relate its sections, and the memory and disk space that it needs at least.
 
-Rules concern loads and material, surface and mesh, history and number of steps. The memory and the disk space of this
-machine are compared with the needs of the job.
+A job that breaks a rule is refused. Rules concern loads and material, surface and mesh, history and number of steps. A
+job that needs more memory or disk space than this machine has gets a warning.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
 
 
 def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
-    """Yield an error if the shift of the material does not reach the temperatures of steady states."""
+    """Yield an error if the shift of the material is not defined at a temperature of steady states."""
     for temperature in (steady.temperatures if steady else None) or ():
         try:
             heated(material, temperature)
@@ -188,10 +188,10 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
 def steady_bodies_do_not_flow(
     grid: Grid, material: AnyMaterial, initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Yield an error if a half space without long-term modulus has no steady state.
+    """Yield an error for steady sliding of a half space without long-term modulus, by `refuse_flow`.
 
-    Such a body flows under waves that do not vary along the sliding, so that it has a steady state only on a periodic
-    line of points in the sliding direction.
+    Such a body flows under waves that do not vary along the sliding direction. It has a steady state only in a periodic
+    box of one row of points along this direction.
     """
     line = grid.boundary != "free" and min(grid.points) == 1
     yield from refuse_flow(material, initial, steady, grid.points if line else ())
@@ -200,7 +200,10 @@ def steady_bodies_do_not_flow(
 def refuse_flow(
     material: AnyMaterial, initial: Initial, steady: Steady | None, line: tuple[int, ...] = ()
 ) -> Iterator[Fault]:
-    """Yield an error for steady sliding of a body without long-term modulus, except on a `line` of points (nx, ny)."""
+    """Yield an error for steady sliding of a body without long-term modulus, unless it cannot flow.
+
+    It cannot on a `line`, a grid of (nx, ny) points with one row along the sliding direction; () for other grids.
+    """
     if material.fitted.long_modulus > 0.0:
         return
     for key in steady_sections(initial, steady):
@@ -302,7 +305,7 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
 
 
 def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
-    """Return the estimated number of steps of a history, without instantaneous stages."""
+    """Return the estimated number of steps with a duration in a history."""
     return math.ceil(sum(estimate_steps(stage, grid) for stage in history))
 
 
@@ -385,7 +388,7 @@ WARN_MEMORY = Kind(
 
 
 def doubt_memory(grid: Grid) -> Iterator[Doubt]:
-    """Yield a warning if the grid cannot fit into the memory of the machines."""
+    """Yield a warning if the grid does not fit into the memory of all machines on which this program runs."""
     needed = (MAPS if all(grid.cyclic) else MAPS_FREE) * 8.0 * grid.nx * grid.ny
     each, count = _memory(), machines()
     if needed > each * count:

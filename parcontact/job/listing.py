@@ -1,8 +1,9 @@
-"""All sections of a job, including sections of effects, and the job with all defaults as plain data: for YAML, for
-comparison with other jobs, and as a table with units.
+"""Sections that effects add to jobs, and jobs with all defaults as plain data and as tables with units.
 
-An effect of this package is found by its folder (`capabilities`). An effect of another package is registered under the
-name of its section, by an entry point that names its class (`effects.effect`):
+Plain data are written as YAML, and compared with those of other jobs.
+
+An effect of this package is found by its folder (`capabilities`). Another package registers an effect by an entry
+point with the name of the effect's section and the effect's class (`effects.effect`):
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
@@ -85,7 +86,7 @@ def unit(kind: type[Part], key: str) -> str:
 
 
 def unit_of_path(path: str) -> str:
-    """Return the unit of a key such as history.1.velocity if all keys of this name have the same unit; else ''."""
+    """Return the unit of a key such as history.1.velocity if all keys called velocity have the same unit; else ''."""
     units = _units().get(path.split(".")[-1], set())
     return next(iter(units)) if len(units) == 1 else ""
 
@@ -189,8 +190,8 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 
 def answers(module: str, name: str) -> list[Any]:
-    """Return the object called `name` of each effect that has one: in the `module` of an effect of this package, or in
-    the class of another package's effect."""
+    """Return all objects called `name` that effects have: effects of this package in their `module`, effects of other
+    packages in their class."""
     others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
     found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
     return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
@@ -209,7 +210,8 @@ def _named(section: str, offered: Any) -> Any:
 
 @contextmanager
 def naming_effect(section: str) -> Iterator[None]:
-    """Raise RunError with the name of the effect if its code fails within the context, or tries to end the program."""
+    """Return a context in which code of the effect of a `section` runs: if the code fails, or tries to end the program,
+    a RunError names the effect."""
     try:
         yield
     except (InputError, RunError):

@@ -1,4 +1,4 @@
-"""Reading of measured maps and line scans. Each format has one reader, whatever is installed.
+"""Reading of measured maps and line scans.
 
 Arrays (`.npy`, `.h5`, `.mat`) and texts of numbers are read here. SurfaceTopography reads formats of instruments, and
 texts in whose header an instrument has written the size or the unit. Heights point up, out of the road: the highest
@@ -46,8 +46,9 @@ class Map:
 
 @dataclass(frozen=True)
 class MapContents:
-    """Heights in a file, shape (ny, nx) or (nx,), with their unit [m], the size of the map along x and y (or of the
-    line), and the unit of this size [m]; None for what the file does not state."""
+    """Contents of a file: heights of shape (ny, nx) or (nx,), the length of their unit [m], the size of the map along x
+    and y, or the length of the line, and the length of the unit of this size [m]. Anything that the file does not state
+    is None."""
 
     values: Array
     unit: float | None = None
@@ -56,8 +57,8 @@ class MapContents:
 
 
 def read_map(part: Topography) -> Map:
-    """Return the map in a file. The job must give units and size if and only if the file does not. Raises
-    InputError."""
+    """Return the map in the file of a shape. The shape must give units and size if the file does not state them, and
+    must not if it does. Raises InputError."""
     path = part.path
     try:
         if not path.is_file():

@@ -49,18 +49,19 @@ def _rising(
 
 
 class DensityLaw(Part):
-    """`b_T = rho T/(rho_ref T_ref)`, temperatures in K; `rho = rho_ref (1 - expansion (T - reference))`."""
+    """Moduli are proportional to density times temperature: `b_T = rho T/(rho_ref T_ref)`, with temperatures in K and
+    `rho = rho_ref (1 - expansion (T - reference))`."""
 
     law: Literal["density"] = "density"
     expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more (rubber: 6e-4)")
 
     def at(self, reference: float) -> Density:
-        """Return the law with the reference temperature of its shift [deg C]."""
+        """Return the law that evaluates b_T, with the `reference` temperature of the horizontal shift [deg C]."""
         return Density(self.expansion, reference)
 
 
 class ModulusFactors(Part):
-    """log10 of b_T at given temperatures, linear between them."""
+    """A table of log10 of b_T at given temperatures, which is linear between them."""
 
     law: Literal["factors"] = "factors"
     temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
@@ -69,7 +70,7 @@ class ModulusFactors(Part):
     rules = (Rule(("temperatures", "logs"), _rising),)
 
     def at(self, reference: float) -> Factors:
-        """Return the law with the reference temperature of its shift [deg C]."""
+        """Return the law that evaluates b_T, with the `reference` temperature of the horizontal shift [deg C]."""
         return Factors(self.temperatures, self.logs, reference)
 
 
@@ -84,7 +85,7 @@ def _reaches(vertical: AnyVertical | None, reference: float) -> Iterator[Fault]:
 
 
 class ShiftLaw(Part):
-    """Base of the laws of a shift; `kind` is the class in `rubber.shift` that evaluates it."""
+    """Base class of the laws of a shift; `kind` is the class in `rubber.shift` that evaluates the law."""
 
     kind: ClassVar[Callable[..., Law]]
     reference: Celsius
@@ -99,7 +100,7 @@ class ShiftLaw(Part):
 
 
 class WlfShift(ShiftLaw):
-    """`log10 a_T = -C1 (T - reference)/(C2 + T - reference)` (Williams, Landel and Ferry)."""
+    """The law of Williams, Landel and Ferry: `log10 a_T = -C1 (T - reference)/(C2 + T - reference)`."""
 
     kind = WLF
     law: Literal["wlf"] = "wlf"
@@ -108,7 +109,7 @@ class WlfShift(ShiftLaw):
 
 
 class ArrheniusShift(ShiftLaw):
-    """`log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, temperatures in K."""
+    """The law of Arrhenius: `log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, with temperatures in K."""
 
     kind = Arrhenius
     law: Literal["arrhenius"] = "arrhenius"
@@ -116,7 +117,7 @@ class ArrheniusShift(ShiftLaw):
 
 
 class FactorsShift(ShiftLaw):
-    """log10 of a_T at given temperatures, linear between them."""
+    """A table of log10 of a_T at given temperatures, which is linear between them."""
 
     kind = Factors
     law: Literal["factors"] = "factors"
@@ -132,7 +133,8 @@ Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_inpu
 
 
 def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
-    """Yield an error unless a material with a temperature has a shift that reaches it."""
+    """Yield an error for a material with a `temperature` [deg C] at which its `shift` is not defined, or without a
+    shift."""
     if temperature is None:
         return
     if shift is None:
@@ -173,7 +175,7 @@ class ZenerBranch(Part):
 
     @property
     def long_modulus(self) -> float:
-        """Return the long-term modulus [Pa]."""
+        """Return the long-term modulus, of both springs in series [Pa]."""
         return self.G0 if math.isinf(self.eta1) else self.G0 * self.G1 / (self.G0 + self.G1)
 
 
@@ -199,7 +201,7 @@ class FractionBranch(Part):
     tau: Positive = Field(description="a positive relaxation time [s]")
 
     def times(self, modulus: float) -> PronyBranch:
-        """Return the branch for a body with the instantaneous modulus `modulus` [Pa]."""
+        """Return the term with a modulus in Pa, for a body with the instantaneous modulus `modulus` [Pa]."""
         return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
 
 
@@ -244,7 +246,7 @@ class Elastic(Part):
 
     @property
     def fitted(self) -> Elastic:
-        """Return the body itself."""
+        """Return the body itself, which needs no fit as `Dma` does."""
         return self
 
     @property
@@ -307,11 +309,12 @@ def _stiff(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranc
 
 
 class Zener(Part):
-    """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
+    """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8) of the paper.
 
-    The body is a fluid if the long-term modulus is zero. With a `shift`, relaxation times and moduli are given at its
-    reference temperature; at another `temperature` times are multiplied by a_T and moduli by b_T. With the
-    instantaneous modulus `modulus_0`, branches are fractions of this modulus.
+    The body is a fluid if the long-term modulus is zero. Relaxation times and moduli of a material with a `shift` are
+    given at the reference temperature of the shift; at another `temperature` times are multiplied by the horizontal
+    factor a_T, and moduli by the vertical factor b_T. If the instantaneous modulus `modulus_0` is given, branches are
+    fractions of this modulus.
     """
 
     model: Literal["zener"] = "zener"
@@ -342,7 +345,7 @@ class Zener(Part):
 
     @property
     def fitted(self) -> Zener:
-        """Return the body itself."""
+        """Return the body itself, which needs no fit as `Dma` does."""
         return self
 
     @property
@@ -433,7 +436,8 @@ def describe_temperature(material: Elastic | Zener | Dma, section: str = "materi
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
-    """Return the material at another temperature [deg C]. Raises InputError for a material without a shift."""
+    """Return the material at this temperature [deg C], higher or lower than its own. Raises InputError for a material
+    without a shift, and beyond its shift."""
     body = material.fitted
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")

@@ -1,7 +1,7 @@
 """Warnings about the physics of a job, before it runs.
 
-The warnings concern jobs outside of the theory, a linear half space with small slopes and strains. Slopes, heights,
-pressures and radii are lower bounds, so that sound jobs get no warning.
+The warnings concern jobs outside of the theory, a linear half space with small slopes and strains. Tests use lower
+bounds of slopes, heights, pressures and radii: jobs within the theory get no warning, and some others get none, too.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ WARN_STEEP = Kind(
 
 
 def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
-    """Yield a warning about an rms slope above STEEP; it names the keys that may be missing for heights from files."""
+    """Yield a warning about an rms `slope` that is not small (above STEEP). The warning names keys that a surface from
+    files may need and does not have, such as a unit."""
     if slope > STEEP:
         yield WARN_STEEP("surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
 
@@ -75,7 +76,7 @@ READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read f
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:
-    """Return True if the rms slope of a surface follows from the job without reading heights."""
+    """Return True if the keys of the job give the rms slope of a surface, so that its heights need not be read."""
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
@@ -197,17 +198,18 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
-    """Return an upper bound of pressure divided by strain, as E* [Pa], after a constant pressure for `seconds`.
+    """Return an upper bound of the pressure divided by the strain [Pa] after a constant pressure for `seconds`, both as
+    in the contact modulus E*.
 
-    The bound is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t with rising creep compliance J, so
-    J(t) >= t/int_0^t E*.
+    The bound is the mean of E* over this time t: as int_0^t E*(t - s) J(s) ds = t, and as the creep compliance J rises,
+    J(t) is at least t/int_0^t E*(s) ds.
     """
     return _contact_modulus(material, seconds, lambda ratio: -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0)
 
 
 def _contact_modulus(material: Elastic | Zener, seconds: float, kept: Callable[[float], float]) -> float:
-    """Return E* [Pa] after `seconds`; `kept` is the share of a branch that is left after a time over its relaxation
-    time."""
+    """Return the contact modulus E* [Pa] after `seconds`. `kept` returns the share of a branch that is left, from the
+    time over the relaxation time of the branch."""
     modulus = material.long_modulus
     for branch in material.branches:
         ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
@@ -365,7 +367,8 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 
 
 def neighbours(job: Sections) -> Iterator[Doubt]:
-    """Yield a warning if the images of a single sphere in a periodic box change its load."""
+    """Yield a warning if the images of a single sphere in a periodic box change its load, for the contact radii of the
+    history by Hertz's theory without adhesion."""
     modulus, grid = instant_contact_modulus(job.material.fitted), job.grid
     yield from acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, grid) for stage in job.history), default=0.0)
@@ -380,9 +383,9 @@ WARN_IMAGES = Kind(
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
-    """Yield a warning if the periodic images of a single sphere change its load by more than ALONE.
+    """Yield a warning if the periodic images of a single sphere change its load by more than a share ALONE.
 
-    `contact` maps the radius R of the sphere [m] to the Hertzian radius of contact a [m]. An image at the distance r
+    `contact` returns the contact radius a [m] from the radius of the sphere [m]; effects give their own. An image at the distance r
     with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact radius changes by
     `2 a^3/(3 pi) sum 1/r^3`.
     """
