@@ -85,8 +85,11 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return a mask of the points that differ from the median of their neighbours by more than OUTLIER median
-    deviations, and the map of these medians; beyond the edges slopes are extrapolated."""
+    """Return a mask of outliers, and the map of the medians of each point and its neighbours.
+
+    Outliers are points that differ from this median by more than OUTLIER times the median of such differences. Beyond
+    the edges of the map slopes are extrapolated.
+    """
     around = scipy.ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
     typical = float(np.median(deviation[deviation > 0.0])) if deviation.any() else np.inf
@@ -122,10 +125,11 @@ def make_periodic(heights: Array) -> Array:
 def resample(
     heights: Array, shape: tuple[int, int], joined: bool = True, most: tuple[float, float] | None = None
 ) -> Array:
-    """Return a map on a grid of (ny, nx) points by its Fourier series.
+    """Return a map on a grid of `shape` (ny, nx) by its Fourier series.
 
-    Waves that the grid does not resolve, Nyquist waves of an even grid, and waves beyond the ellipse of `most` waves
-    along y and x are removed. The harmonic part of a map that is not `joined` at its edges is resampled by splines.
+    Waves that the grid does not resolve, and Nyquist waves of an even grid, are removed. If `most` is given, only waves
+    within an ellipse are kept, whose half axes are these numbers of waves along y and along x. A map that is not
+    `joined` does not go on across its edges: its harmonic part (`make_periodic`) is resampled by splines.
     """
     old = heights.shape
     if old == shape and most is None:
@@ -148,10 +152,10 @@ SLACK = 1e-6  # rounding: relative excess of the box over the map that is ignore
 
 @dataclass(frozen=True)
 class Prepared:
-    """A measured map prepared for a box: heights [m] on the grid, shape (ny, nx), of zero mean.
+    """A measured map that is prepared for a box: its heights [m] on the grid, of shape (ny, nx) and zero mean.
 
-    Also the section of the job, the whole map, and the part of the map in the box, as cut and as treated, with its size
-    [m].
+    `part` is the shape in the job, `whole` the map in the file, `cut` the heights [m] of the part of the map that lies
+    in the box, `treated` these heights after treatment, and `size` [m] the size of this part along x and y.
     """
 
     heights: Array
@@ -163,7 +167,8 @@ class Prepared:
 
 
 def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
-    """Return the map of a job on its grid; root only. Raises InputError for a map that is smaller than the box."""
+    """Return the map `found` of a job on the grid of the job; to be called on root only. Raises InputError for a map
+    that is smaller than the box."""
     periodic = part.periodic or ("smooth" if any(grid.cyclic) else "none")
     copies = part.copies
     rows, columns = (
@@ -221,8 +226,8 @@ FORMS = "q[1/m] C2D[m^4] or q[1/m] C1D[m^3] (or mm, um, nm)"
 
 @dataclass(frozen=True)
 class MeasuredSpectrum:
-    """An isotropic spectrum Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond the last wavenumber Phi
-    falls as q^-`fall`, or is 0 if `fall` is 0."""
+    """An isotropic spectrum: its density `phi` [m^4] at rising wavenumbers `q` [rad/m], both of shape (n,). Beyond the
+    last wavenumber it falls with the power -`fall` of q, or is 0 if `fall` is 0."""
 
     q: Array
     phi: Array

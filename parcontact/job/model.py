@@ -52,8 +52,8 @@ class Job(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Return `data` with names of all stages, the kernel for the boundary, and an output directory by the file's
-        name."""
+        """Return `data` with names of all stages, the kernel that suits the boundary, and an output directory that is
+        named after the job file."""
         data = prepared(data)
         if data.get("bands") is not None:
             data.setdefault("grid", dict(NO_GRID))

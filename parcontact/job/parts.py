@@ -59,12 +59,12 @@ class Included(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Origin of a job: its absolute path, and the files of included materials; `mesh` describes chosen points.
-    `approaches` are the places of the approaches of the stages, `strict` is the place of `numerics.strict` ('' for jobs
-    from Python).
+    """Where a job comes from: the absolute path of its file, and the files of its `included` materials.
 
-    `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them as texts.
-    `names_directory`: the job gives its output directory.
+    `from_file` is False for a job from Python. If `numbers_as_texts` is True, texts such as 1e-3 count as numbers,
+    since PyYAML's `safe_load` returns them as texts. `names_directory` is True if the job gives its output directory.
+    `mesh` is a sentence on points that the program chose, '' if the job gives them. `approaches` are the places of the
+    approaches of all stages, and `strict` is the place of `numerics.strict`, for messages; '' for jobs from Python.
     """
 
     path: Path = Path("job.yaml")
@@ -78,7 +78,10 @@ class Origin(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A check of the fields in `needs`; it runs if all these fields are correct (wrong items of lists are None)."""
+    """A `check` of the fields named in `needs`, which gets their values and yields faults.
+
+    It runs if all these fields are correct. A list with wrong items counts as correct, with None for each such item.
+    """
 
     needs: tuple[str, ...]
     check: Callable[..., Iterator[Fault]]
@@ -260,7 +263,8 @@ def literal_words(annotation: Any) -> tuple[str, ...]:
 def chosen(
     key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
 ) -> Callable[[Any, ValidationInfo], Any]:
-    """Return a validator that chooses the kind of a part by its `key`; `called` are other names of kinds."""
+    """Return a validator that reads a mapping as one of the parts `kinds`, by the word at its `key`. For advice,
+    `called` maps words of other programs to words of `kinds`."""
 
     def choose(data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, tuple(kinds.values())):

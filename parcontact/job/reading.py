@@ -66,7 +66,7 @@ Axis = list[tuple[Setting, ...]]  # of one mapping: for each of its values, the 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The mappings of a sweep; an empty list for a job without a sweep."""
+    """A sweep: an axis for each of its mappings, none for a job without a sweep, and the place of the sweep."""
 
     axes: list[Axis]
     place: Place
@@ -82,7 +82,8 @@ class Sweep:
 
 
 def take_sweep(source: Source) -> Sweep | None:
-    """Remove the sweep from the data of a job and return it; None for a sweep with mistakes, which `source` notes."""
+    """Remove the sweep from the data of a job and return it. A sweep with mistakes, which `source` then has, is
+    returned as None."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)
@@ -376,8 +377,8 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
 
 
 def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid | None = None) -> tuple[Case, ...]:
-    """Return all cases of a job (one without a sweep), read as by `load`. A mistake names the first case that has
-    it."""
+    """Return all cases of a job, read as by `load`; a job without a sweep is one case. A mistake that only some cases
+    have names the first of them."""
     first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if not sweep:
         if first is None:

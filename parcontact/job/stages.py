@@ -108,7 +108,7 @@ class Swing(tuple[float, float]):
 
 
 class SwingKeys(Part):
-    """A velocity that oscillates."""
+    """The keys of a velocity that oscillates."""
 
     amplitude: Vector = Field(description="an amplitude [m/s]: a number along x, or [vx, vy]")
     frequency: Positive = Field(description="a positive frequency [Hz]")
@@ -126,7 +126,8 @@ OR_SWING = WrapValidator(_swing, json_schema_input_type=Vector | SwingKeys)  # o
 
 
 def check_cycles(cycles: int | None, velocity: tuple[float, float], *loads: Any) -> Iterator[Fault]:
-    """Yield errors unless a stage oscillates in one quantity at most, and has cycles exactly if it oscillates."""
+    """Yield errors if several quantities of a stage oscillate, if one oscillates and the stage has no number of cycles,
+    and if the stage has cycles and nothing oscillates."""
     given = zip(("velocity", *CONTROLS), (velocity, *loads), strict=True)
     found = [name for name, value in given if isinstance(value, Swing | Oscillation)]
     if len(found) > 1:
@@ -345,7 +346,7 @@ class Stage(Part):
 
     @property
     def control(self) -> Control:
-        """Return the kind of the prescribed load."""
+        """Return the kind of the prescribed load: pressure, force or approach."""
         return next(name for name in CONTROLS if getattr(self, name) is not None)
 
     @property

@@ -358,8 +358,8 @@ Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnySha
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; an empty tuple for a flat surface.
-    Round shapes and files may have every wave from the box to two cells."""
+    """Return the wavenumber [rad/m] of a wave, or the lowest and the highest wavenumber of another shape; () for a flat
+    surface. Round shapes and files may have every wave from the length of the box to that of two cells."""
     longest = 2.0 * math.pi / max(grid.size)
     cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
     if isinstance(shape, Flat):
