@@ -142,9 +142,7 @@ def _choose(columns: dict[str, Array], whole: dict[str, Array]) -> dict[str, Arr
 def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Panel:
     """Return a panel of the friction of each band over velocity, with the theory's sum as a line."""
     found = _stacked(columns, "velocity", Axis("sliding velocity", "m/s"))
-    if theory is None:
-        return found
-    if not (speeds := np.unique(theory["velocity"])).size:
+    if theory is None or not (speeds := np.unique(theory["velocity"])).size:
         return found
     sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
     return replace(found, series=[*found.series, entry("theory", THEORY_LOOK), Line("", speeds, sums, THEORY_LOOK)])

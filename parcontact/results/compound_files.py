@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..files import files, outputs
@@ -162,15 +161,12 @@ def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[st
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
     if not drawn:
         return None
-    with style.drawing():
-        return style.save_figure(_convergence(drawn, doubts), directory / outputs.STUDY_PICTURE)
-
-
-def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Figure:
     own: dict[str, list[StudyCurve]] = {}
-    for curve in curves:
+    for curve in drawn:
         own.setdefault(curve.quantity, []).append(curve)
-    return picture("", [[panel for name, found in own.items() for panel in _errors(name, found, doubts[name])]])
+    panels = [panel for name, found in own.items() for panel in _errors(name, found, doubts[name])]
+    with style.drawing():
+        return style.save_figure(picture("", [panels]), directory / outputs.STUDY_PICTURE)
 
 
 def _errors(name: str, curves: Sequence[StudyCurve], doubt: float) -> list[Panel]:
@@ -184,17 +180,11 @@ def _errors(name: str, curves: Sequence[StudyCurve], doubt: float) -> list[Panel
         shades.append(Shade("", low, 100 * doubt, "y"))
     finer = Axis("refinement, coarsest = 1"), [max(one.sizes) / np.asarray(one.sizes) for one in curves]
     times = Axis("time of all steps", "s"), [np.asarray(one.seconds, float) for one in curves]
-    return [
-        Panel(
-            *(name, x, y, [one.over(at) for one, at in zip(curves, places, strict=True)]),
-            shades=shades,
-            log_x=True,
-            log_y=True,
-            x_range=_widened(np.concatenate(places)),
-            y_range=(low, high),
-        )
-        for x, places in (finer, times)
-    ]
+    panels, logarithmic = [], Panel(name, Axis(""), y, shades=shades, log_x=True, log_y=True, y_range=(low, high))
+    for x, places in (finer, times):
+        lines = [one.over(at) for one, at in zip(curves, places, strict=True)]
+        panels.append(replace(logarithmic, x=x, series=lines, x_range=_widened(np.concatenate(places))))
+    return panels
 
 
 def _widened(values: Array) -> tuple[float, float]:

@@ -77,24 +77,22 @@ def _pressures(
 
 def _make_strip(run: PlottedRun, fields: Fields) -> Panel:
     """Return a panel of pressures along the long side of a narrow map."""
-    lies = fields.x.size > fields.y.size
+    along, place = _long_side(fields.x, fields.y)
     chosen, load = _choose_instants(run, fields)
-    maps = [(name, fields.file["pressure"][index]) for index, name in chosen]
-    curves = [(name, fields.x, field[0]) if lies else (name, fields.y, field[:, 0]) for name, field in maps]
+    curves = [(name, place, _along(fields.file["pressure"][index])) for index, name in chosen]
     some = "some of the " if len(curves) < len(fields.shown) else "the "
     title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
-    return _pressures(curves, "x" if lies else "y", title)
+    return _pressures(curves, along, title)
 
 
 def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
     """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if tractions are saved;
     with their bounds if the job has a coefficient of friction."""
-    lies = fields.x.size > fields.y.size
-    along, place = ("x", fields.x) if lies else ("y", fields.y)
+    along, place = _long_side(fields.x, fields.y)
     traction, pressure = fields.read(f"traction_{along}"), fields.read("pressure")
     if traction is None or pressure is None:
         return
-    t, p = (field[0] if lies else field[:, 0] for field in (traction, pressure))
+    t, p = _along(traction), _along(pressure)
     instant = run.instant(*fields.when(fields.chosen))
     bound, touched = run.job.section("interface").coefficient, place[p > 0.0]
     lines = [Line("traction", place, t, {"color": style.BLUE})]
@@ -287,11 +285,16 @@ def _colors(
 
 def _line(name: str, points: tuple[Array, Array], values: Array, limits: tuple[float, float]) -> Panel:
     """Return a narrow map as a line over its long side."""
-    lies, (low, high) = points[0].size > points[1].size, limits
-    line = Line("", points[0] if lies else points[1], _along(values), {"color": style.BLUE})
+    (along, place), (low, high) = _long_side(*points), limits
+    line = Line("", place, _along(values), {"color": style.BLUE})
     shown = (low, low + 1.05 * (high - low)) if high > low else None
     of = Axis(name.replace("_", " "), LOOKS[name].unit)
-    return Panel("maps", PLACES[not lies], of, [line], bottom=False, y_range=shown)
+    return Panel("maps", Axis(along, "m"), of, [line], bottom=False, y_range=shown)
+
+
+def _long_side(x: Array, y: Array) -> tuple[str, Array]:
+    """Return the name and the points [m] of the long side of a narrow map."""
+    return ("x", x) if x.size > y.size else ("y", y)
 
 
 def _along(values: Array) -> Array:

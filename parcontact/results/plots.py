@@ -146,11 +146,8 @@ def _suggest(path: Path) -> str:
     """Return a suggestion: the first directory below with results, or the output directory of a job file."""
     if path.is_file():
         return "; give the output directory of a run, such as out/job"
-    found = [
-        table.parent
-        for name in (outputs.RUN.table, outputs.STEADY.table, outputs.SWEEP.table)
-        for table in sorted(path.glob(f"*/{name}"))
-    ]
+    tables = (sorted(path.glob(f"*/{each.table}")) for each in (outputs.RUN, outputs.STEADY, outputs.SWEEP))
+    found = [table.parent for there in tables for table in there]
     return f"; did you mean {found[0]}?" if found else ""
 
 

@@ -106,18 +106,14 @@ def _results(case: Case) -> dict[str, Any]:
             if any(stage.frequency for stage in case.job.history):
                 row |= slide.measure_last(case.job, columns)
             asked = [name for key, names in SECTIONS.items() if _asks_for(case, key) for name in names]
-            row |= {name: _last(columns[name]) for name in asked if name in columns}
+            known = {name: [value for value in columns[name] if value == value] for name in asked if name in columns}
+            row |= {name: values[-1] if values else math.nan for name, values in known.items()}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.mean_errors(case.job.history, columns)
             within = slide.absolute_errors(case.job.history, columns, case.job.grid.dx)
             row |= {name: within.get(name.removesuffix("_error"), math.nan) for name in FRICTION_ERRORS}
     return row
-
-
-def _last(values: Sequence[float]) -> float:
-    """Return the last value that is not NaN, or NaN."""
-    return next((value for value in reversed(values) if value == value), math.nan)
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
