@@ -10,6 +10,7 @@ import argparse
 import os
 import resource
 import sys
+import time
 from functools import partial, wraps
 from typing import TYPE_CHECKING
 
@@ -286,9 +287,6 @@ def _describe_waves(job: Job) -> list[str]:
 
 def plan(options: argparse.Namespace) -> int:
     """Estimate the steps, time, memory and disk of a job; writes nothing."""
-    from ..files import stopping
-
-    started = stopping.age()
     world = start_ranks()
     from itertools import chain
 
@@ -297,6 +295,7 @@ def plan(options: argparse.Namespace) -> int:
     from .memory import count_side_by_side
     from .plan import Planner
 
+    started = time.process_time()
     chosen = on_root(world, lambda: cases_of(options)[1])
     doubts = on_root(world, lambda: sentences_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, cores()}), options.seconds, started)
