@@ -442,7 +442,12 @@ STUDY: Table = (
         "cells slid in a step; `auto` if the stages choose their steps and the study varies none",
     ),
     Column("integrator", "", "integrator"),
-    *(one for one in SWEEP_RESULTS if one.name != "mu_max_distance"),
+    *(one for one in SWEEP_RESULTS if one.name in ("mu_max", "mu_dyn")),
+    Column(
+        *("contact_area", ""),
+        "mean over the same part; without a slide, mean over time, or over loads if they take no time",
+    ),
+    SWEEP_RESULTS[-1],
     Column("seconds", "s", "wall time of all steps"),
     Column(*("error_mu_max", ""), "relative to the extrapolated limit; empty where nothing slides, as `error_mu_dyn`"),
     Column("error_mu_dyn", "", "relative to the extrapolated limit"),

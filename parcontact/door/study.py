@@ -26,11 +26,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
 from ..errors import FAILED, STOPPED_EARLY, InputError
-from ..files import files, outputs, run, sweep, sweep_warnings
+from ..files import files, outputs, run, sweep, sweep_warnings, tables
 from ..files.directory import Directory
 from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
@@ -111,20 +112,28 @@ def _cells_of_time_steps(job: Job) -> float:
     return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
 
 
+def _has_time_steps(job: Job) -> bool:
+    """Return True if a stage slides or has a given time step, so that a study can refine its steps."""
+    return any(stage.speed or stage.time_step not in (None, AUTO) for stage in job.history)
+
+
 def ladders(job: Job) -> Ladders:
     """Return the lists of settings of a job's study. Raises InputError if there is none."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
+    if study.cells_per_step and not _has_time_steps(job):
+        raise InputError("study.cells_per_step: no stage slides or has a time step; leave it out")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
-    if own is None and not _sliding(job):
+    if own is None and not _sliding(job) and _has_time_steps(job):
         own = _cells_of_time_steps(job)
     if own is None and study.cells_per_step:
         own = 1.0
     case = Settings(job.grid.nx, own, numerics.integrator)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
     cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
-    shared = numerics.asked.of_steps if _sliding(job) and not study.cells_per_step else 0.0
+    chosen = any(stage.chooses for stage in job.history) if own is None else _sliding(job) and not study.cells_per_step
+    shared = numerics.asked.of_steps if chosen else 0.0
     slides = any(stage.speed for stage in job.history)
     return Ladders(meshes, cells, study.integrator or (numerics.integrator,), case, shared, slides)
 
@@ -416,6 +425,8 @@ def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: 
     """Write limits, errors and a picture of the finished cases; return the sentences of study.txt; root only."""
     place = job.output.directory
     rows = dict(zip(cases, Results(place, "sweep").cases, strict=True))
+    if not refined.slides:
+        rows = {case: {**row, **_mean_areas(cases[case].job.output.directory)} for case, row in rows.items()}
     reference = references(refined, rows)
     errors = {case: estimate_errors(row, reference) for case, row in rows.items()}
     named = {case: {f"error_{name}": error for name, error in found.items()} for case, found in errors.items()}
@@ -427,6 +438,16 @@ def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: 
     doubts = {name: limit.doubt for name, limit in reference.items()}
     compound_files.plot_study(place, _curves(refined, rows, errors), doubts)
     return lines
+
+
+def _mean_areas(directory: Path) -> dict[str, float]:
+    """Return the contact areas of a run as means over its time, or over its loads if it takes no time."""
+    columns, found = tables.read_columns(directory / outputs.RUN.table), dict[str, float]()
+    for name in ("contact_area", "contact_area_corrected"):
+        time, area = np.array([columns["time"], columns[name]])[:, 1:]  # without the initial state
+        span = time[-1] - time[0]
+        found[name] = float(np.trapezoid(area, time) / span if span else np.mean(area))
+    return found
 
 
 def _curves(refined: Ladders, rows: Outcomes, errors: Errors) -> list[compound_files.StudyCurve]:

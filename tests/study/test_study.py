@@ -253,6 +253,31 @@ def test_without_a_slide_nothing_is_said_of_friction(main: Main, tmp_path: Path,
     assert {row["error_mu_max"] for row in rows(tmp_path / "out" / "study.csv")} == {""}
 
 
+def test_contacts_that_do_not_slide(main: Main, tmp_path: Path) -> None:
+    """One case a mesh, as no step is given; areas are means over the loads, the last of which opens the contact."""
+    job, out = tmp_path / "rest.yaml", tmp_path / "out"
+    loads = "history: [{pressure: 1.0e4}, {pressure: 2.0e4}, {approach: -1.0e-6}]"
+    job.write_text(WAVE.partition("initial")[0] + f"{loads}\nstudy: {{mesh: [16, 32]}}\noutput: {{directory: out}}\n")
+    assert main("study", job)[0] == 0
+    cases = [rows(path / "measures.csv") for path in sorted((out / "cases").iterdir())]
+    table = rows(out / "study.csv")
+    assert [row["mesh"] for row in table] == ["16", "32"]
+    for row, steps in zip(table, cases, strict=True):
+        areas = [float(step["contact_area"]) for step in steps[1:]]
+        assert float(row["contact_area"]) == pytest.approx(fmean(areas), rel=1e-12)
+        assert areas[-1] == 0.0 < areas[0]
+    code, _, err = main("study", job, "--set", "study.cells_per_step=[2,1]")
+    assert (code, "study.cells_per_step: no stage slides or has a time step" in err) == (2, True)
+
+
+def test_a_press_that_takes_time_is_measured_over_time(tmp_path: Path) -> None:
+    """Two areas, held for 1 s and for 3 s."""
+    (tmp_path / "measures.csv").write_text(
+        "time,contact_area,contact_area_corrected\n0,0,\n0,.1,.2\n1,.1,.2\n1,.5,.4\n4,.5,.4\n"
+    )
+    assert study._mean_areas(tmp_path) == pytest.approx({"contact_area": 0.4, "contact_area_corrected": 0.35})
+
+
 def test_a_case_that_cannot_be(main: Main, tmp_path: Path) -> None:
     """All cases are read before the first is run; nothing is written."""
     job = tmp_path / "wave.yaml"
