@@ -293,9 +293,9 @@ def _panels_of_loops(run: PlottedRun) -> Iterator[Panel]:
         elif stage.frequency and (way := way_along(stage, columns, starts[number])) is not None:
             friction = friction_along(stage, columns) / (run.area * columns["pressure"])
             frictions.append(Line(name, way, friction, look))
-    loads, frictions = (
-        lines if len(lines) > 1 else [replace(line, name="") for line in lines] for lines in (loads, frictions)
-    )
+    for lines in (loads, frictions):
+        if len(lines) == 1:
+            lines[0] = replace(lines[0], name="")
     if loads:
         yield Panel("loop", Axis("approach", "m"), load_axis, loads, bottom=False)
     if frictions:

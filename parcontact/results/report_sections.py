@@ -132,9 +132,8 @@ def friction_tables(curve: Results) -> list[ReportTable]:
     degrees, found = list(dict.fromkeys(place[2] for place in sorted(cells, key=_order))), []
     for pressure in dict.fromkeys(place[1] for place in sorted(cells, key=_order)):
         speeds = sorted({place[0] for place in cells if place[1] == pressure})
-        rows = [
-            [quantity(speed, "m/s"), *(cells.get((speed, pressure, each), "–") for each in degrees)] for speed in speeds
-        ]
+        friction = [[cells.get((speed, pressure, each), "–") for each in degrees] for speed in speeds]
+        rows = [[quantity(speed, "m/s"), *values] for speed, values in zip(speeds, friction, strict=True)]
         head = ["velocity", *(f"at {each:g} °C" if each > -math.inf else "friction" for each in degrees)]
         found.append(ReportTable(head, rows[:MOST], f"friction under {quantity(pressure, 'Pa')}"))
     return found

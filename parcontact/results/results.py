@@ -271,13 +271,11 @@ class Results:
                 saved = np.array(layout.saved, dtype=int)
                 places = {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
                 steps = ("t", file["step"][...][saved], {"units": "1"})
-                found = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
+                found = {name: LazilyIndexedArray(SavedMap(file[name], saved)) for name in layout.names}
         except hdf5.FAILURES as error:
             raise InputError(f"{path} cannot be read: {files.reason(error)}") from None
-        drawn = {
-            f"{name}_map": (("t", "y", "x"), LazilyIndexedArray(rows), {"units": fields.UNITS[name]})
-            for name, rows in found.items()
-        }
+        along = ("t", "y", "x")
+        drawn = {f"{name}_map": (along, rows, {"units": fields.UNITS[name]}) for name, rows in found.items()}
         return drawn, {"t": ("t", layout.times[saved], {"units": "s"}), "map_step": steps, **places}
 
     @property

@@ -2,7 +2,6 @@
 
 The file is open only during a read, as an open file would block a running run."""
 
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -15,11 +14,9 @@ from xarray.core.indexing import ExplicitIndexer, IndexingSupport, explicit_inde
 class SavedMap(BackendArray):
     """A map of shape (t, y, x) in a field file, restricted to the instants `saved`."""
 
-    def __init__(
-        self, path: Path, name: str, shape: tuple[int, int, int], dtype: np.dtype[Any], saved: NDArray[np.intp]
-    ) -> None:
-        self.path, self.name, self.saved = path, name, saved
-        self.shape, self.dtype = (saved.size, *shape[1:]), dtype
+    def __init__(self, dataset: h5py.Dataset, saved: NDArray[np.intp]) -> None:
+        self.path, self.name, self.saved = dataset.file.filename, dataset.name, saved
+        self.shape, self.dtype = (saved.size, *dataset.shape[1:]), dataset.dtype
 
     def __getitem__(self, key: ExplicitIndexer) -> Any:
         return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)

@@ -478,9 +478,8 @@ def measure_last(job: Job, columns: Columns) -> dict[str, float]:
 def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
-    files.replace_file(
-        directory / outputs.CYCLES, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found))
-    )
+    rows = (values_of(CYCLES, cycle) for cycle in found)
+    files.replace_file(directory / outputs.CYCLES, to_csv(names_of(CYCLES), rows))
     yield from describe_cycles(job, found)
 
 
