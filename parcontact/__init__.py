@@ -11,8 +11,7 @@ Public names are imported when they are first used."""
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .doubts import ParcontactWarning
-from .errors import InputError, JobError, RunError
+from .errors import InputError, JobError, ParcontactWarning, RunError
 
 if TYPE_CHECKING:
     from .door.python import Curve, Material, material, open, steady, surface

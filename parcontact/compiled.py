@@ -1,10 +1,16 @@
 """Decorators that compile loops over rows and functions of points, by numba.
 
 Sums may be reordered to use vector units; NaN and infinity keep their meaning. Machine code is kept in a private
-directory, so that only the first run waits for the compiler; without such a directory every run compiles."""
+directory, so that only the first run waits for the compiler; without such a directory every run compiles.
+
+Plans of transforms are kept in such a directory, too. Its files are executed or trusted unread, so that no other user
+may be able to write them: it has mode 0700 and lies in the user's cache directory, or there is none.
+"""
 
 import gc
 import hashlib
+import os
+import stat
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,8 +23,6 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import codegen, event
-
-from . import errors
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 OPTIONS: dict[str, Any] = {
@@ -68,7 +72,7 @@ def _cache_of(compiled: Any) -> Any:
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:
     """Return the function made by `compiler(kept)`; `kept` is True if a private directory can hold its code."""
-    place = errors.directory("compiled")
+    place = directory("compiled")
     if place is None:
         return compiler(False)
     config: Any = numba.config
@@ -114,7 +118,7 @@ def say_that_it_compiles() -> None:
     mpi = sys.modules.get("mpi4py.MPI")
     watched = sys.stderr.isatty() or "ipykernel" in sys.modules
     if watched and (mpi is None or mpi.COMM_WORLD.rank == 0):
-        kept = "once on this machine" if errors.directory("compiled") else "in each run, as they cannot be kept"
+        kept = "once on this machine" if directory("compiled") else "in each run, as they cannot be kept"
         text = f"compiling loops, some ten seconds, {kept}; `parcontact doctor` compiles them beforehand"
         print(f"parcontact: {text}", file=sys.stderr, flush=True)
 
@@ -166,3 +170,44 @@ def _set_layout(library: Any, module: Any) -> None:
 
 event.register("numba:compile", _CompileListener())
 _import_numba_arrays()
+
+
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def directory(name: str) -> Path | None:
+    """Return the program's directory `name` in the user's cache directory, created if missing; None if unsafe."""
+    with suppress(OSError, RuntimeError):
+        home = Path.home()
+        given = Path(os.environ.get("XDG_CACHE_HOME") or "")
+        cache = given if given.is_absolute() else home / ".cache"
+        if given.is_absolute() or home.is_dir():  # a home that does not exist is not made
+            cache.mkdir(mode=0o700, parents=True, exist_ok=True)
+            place = cache.resolve() / "parcontact" / name
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+            return place if _private(place) else None
+    return None
+
+
+def _private(place: Path) -> bool:
+    """Return True if the directory belongs to this user and no other user can write to it or replace it."""
+    found = place.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
+        return False
+    if not all(_keeps_its_entries(parent) for parent in place.parents) or not os.access(place, os.W_OK | os.X_OK):
+        return False
+    if stat.S_IMODE(found.st_mode) != 0o700:
+        place.chmod(0o700)
+    return True
+
+
+def _keeps_its_entries(parent: Path) -> bool:
+    """Return True if only root and this user can replace entries of a directory.
+
+    A group may write to the directory if it is the user's private group, which has the same number as the user.
+    """
+    found, own = parent.stat(), os.geteuid()
+    if found.st_uid not in (0, own):
+        return False
+    others = stat.S_IWOTH if found.st_uid == found.st_gid == own else OTHERS_WRITE
+    return not found.st_mode & others or bool(found.st_mode & stat.S_ISVTX)

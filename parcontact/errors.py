@@ -1,14 +1,16 @@
-"""Errors that a user can correct, and directories for files that a user keeps between runs.
+"""Errors that end the program with a sentence, and warnings as data (kind, place, numbers) with their sentences.
 
-Such files are compiled loops and plans of transforms. They are executed or trusted unread, so that no other user may be
-able to write them: they are stored in a directory of mode 0700 in the user's cache directory, or not at all.
+Code that checks a job, a surface or a contact returns warnings as `Doubt` objects. Each `Kind` of warning is defined
+next to its test. No code compares or parses the sentences.
 """
 
-import os
-import stat
-from collections.abc import Sequence
-from contextlib import suppress
-from pathlib import Path
+import math
+import string
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .printed import per_cent, quantity, rounded_down, rounded_up
 
 DONE, FAILED, BAD_INPUT, STOPPED_EARLY = range(4)  # exit codes; stopped early: with a good checkpoint, run again
 
@@ -47,42 +49,96 @@ class UnsolvedError(RunError):
         return UnsolvedError, (self.place, self.reason)  # for pickling, between ranks
 
 
-OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+NO_NUMBERS: Mapping[str, object] = {}
 
 
-def directory(name: str) -> Path | None:
-    """Return the program's directory `name` in the user's cache directory, created if missing; None if unsafe."""
-    with suppress(OSError, RuntimeError):
-        home = Path.home()
-        given = Path(os.environ.get("XDG_CACHE_HOME") or "")
-        cache = given if given.is_absolute() else home / ".cache"
-        if given.is_absolute() or home.is_dir():  # a home that does not exist is not made
-            cache.mkdir(mode=0o700, parents=True, exist_ok=True)
-            place = cache.resolve() / "parcontact" / name
-            place.mkdir(mode=0o700, parents=True, exist_ok=True)
-            return place if _private(place) else None
-    return None
+@dataclass(frozen=True)
+class Doubt:
+    """A warning: its `kind`, its `place` (such as a key of the job), and its `sentence` with the numbers (SI units) and
+    names in it."""
+
+    kind: str
+    place: str
+    numbers: Mapping[str, object]
+    sentence: str
+
+    @property
+    def body(self) -> str:
+        """Return the sentence without the place."""
+        return FORMATTER.vformat(self.sentence, (), self.numbers)
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.body}" if self.place else self.body
+
+    @property
+    def subject(self) -> tuple[str, ...]:
+        """Return kind, place and names except `where`: warnings with the same subject differ only in numbers."""
+        names = (value for name, value in self.numbers.items() if isinstance(value, str) and name != "where")
+        return self.kind, self.place, *names
 
 
-def _private(place: Path) -> bool:
-    """Return True if the directory belongs to this user and no other user can write to it or replace it."""
-    found = place.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
-        return False
-    if not all(_keeps_its_entries(parent) for parent in place.parents) or not os.access(place, os.W_OK | os.X_OK):
-        return False
-    if stat.S_IMODE(found.st_mode) != 0o700:
-        place.chmod(0o700)
-    return True
+@dataclass(frozen=True)
+class Kind:
+    """A kind of warning: its name, and its sentence with places for numbers. Calling it returns a `Doubt`."""
+
+    name: str
+    sentence: str
+
+    def __call__(self, place: str = "", numbers: Mapping[str, object] = NO_NUMBERS) -> Doubt:
+        return Doubt(self.name, place, numbers, self.sentence)
 
 
-def _keeps_its_entries(parent: Path) -> bool:
-    """Return True if only root and this user can replace entries of a directory.
+class ParcontactWarning(UserWarning):
+    """A warning about a job or its results.
 
-    A group may write to the directory if it is the user's private group, which has the same number as the user.
+    `kind` names the problem, `place` the key of the job or `""`, and `numbers` has the values of the sentence in SI
+    units. Python's filters treat two warnings that differ in these numbers alone as the same: a line that calls this
+    package many times shows each problem once.
     """
-    found, own = parent.stat(), os.geteuid()
-    if found.st_uid not in (0, own):
-        return False
-    others = stat.S_IWOTH if found.st_uid == found.st_gid == own else OTHERS_WRITE
-    return not found.st_mode & others or bool(found.st_mode & stat.S_ISVTX)
+
+    def __init__(self, doubt: Doubt) -> None:
+        super().__init__(doubt)
+        self.kind: str = doubt.kind
+        self.place: str = doubt.place
+        self.numbers: Mapping[str, object] = doubt.numbers
+
+    def __str__(self) -> str:
+        return _WarningText(self.args[0])
+
+
+class _WarningText(str):
+    """The sentence of a warning, equal to every other one with the same subject, as Python's filters compare texts."""
+
+    subject: tuple[str, ...]
+
+    def __new__(cls, doubt: Doubt) -> "_WarningText":
+        text = super().__new__(cls, doubt)
+        text.subject = doubt.subject
+        return text
+
+    def __eq__(self, other: object) -> bool:
+        return self.subject == other.subject if isinstance(other, _WarningText) else super().__eq__(other)
+
+    def __hash__(self) -> int:
+        return hash(self.subject)
+
+
+class _Formatter(string.Formatter):
+    """Formats like `str.format`, and with `!p` (a share in per cent), `!m` and `!M` (a length with its unit in four and
+    three digits), `!t` (a multiple), and `!u` and `!d` (a number that is rounded up or down, so that a job that follows
+    the advice keeps the limit)."""
+
+    def convert_field(self, value: Any, conversion: Any) -> Any:
+        if conversion == "p":
+            return per_cent(value)
+        if conversion == "t":
+            return f"{value:.3g} times" if math.isfinite(value) else "far above"
+        if conversion in ("u", "d"):
+            return (rounded_up if conversion == "u" else rounded_down)(value)
+        if conversion in ("m", "M"):
+            return quantity(value, "m", 4 if conversion == "m" else 3)
+        return super().convert_field(value, conversion)
+
+
+FORMATTER = _Formatter()
+SAID = Kind("said", "{text}")  # whole sentences, from plug-ins and from tables of measured moduli

@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import job as jobs
-from ..doubts import Doubt, Kind
-from ..errors import InputError
+from ..errors import Doubt, InputError, Kind
 from ..job import Grid, Job, Topography, map_files, measured_maps
 from ..job.advice import fast_length
 from ..job.calculation import LEAST_CELLS, Bands

@@ -10,9 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..columns import BANDS, choose_columns, names_of
-from ..doubts import Doubt
 from ..effects.relaxation import relaxation_of, temperature_of
-from ..errors import RunError, UnsolvedError
+from ..errors import Doubt, RunError, UnsolvedError
 from ..files import outputs
 from ..job import Job
 from ..job.listing import answers

@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import capabilities, errors
+from .. import capabilities, compiled
 from ..errors import RunError
 from ..files import provenance, run
 from ..files.recorder import StepRow
@@ -248,7 +248,7 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
         loops.dot(direction, image)
     for compile_loops in capabilities.offers("effect", "compile_loops"):
         compile_loops()
-    place = errors.directory("compiled")
+    place = compiled.directory("compiled")
     kept = f"kept in {place}" if place else "not kept, as there is no private cache directory"
     return f"compiled loops: ready after {time.perf_counter() - began:.2g} s, {kept}"
 

@@ -26,9 +26,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
-from ..doubts import Doubt, Kind, ParcontactWarning
 from ..effects.relaxation import relaxation_of
-from ..errors import InputError, JobError, RunError
+from ..errors import Doubt, InputError, JobError, Kind, ParcontactWarning, RunError
 from ..files import wisdom
 from ..files.tables import Wanted
 from ..job import Job, log_range

@@ -15,9 +15,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..columns import cells
-from ..doubts import Doubt
 from ..effects.effect import columns_of
-from ..errors import InputError
+from ..errors import Doubt, InputError
 from ..files import checkpoint, recorder, restart, run, wisdom
 from ..files.checkpoint import Contents, Facts, TableMark
 from ..files.fields import UNITS

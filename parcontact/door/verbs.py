@@ -20,7 +20,7 @@ from ..parallel.root import on_root
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from ..doubts import Doubt
+    from ..errors import Doubt
     from ..files.stopping import Options
     from ..job import Case, Job
     from ..parallel.mpi import MPI

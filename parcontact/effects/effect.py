@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, P
 from numpy.typing import DTypeLike, NDArray
 
 from ..contact.problem import Box, Mask
-from ..doubts import Doubt
-from ..errors import InputError
+from ..errors import Doubt, InputError
 from ..job import Job, listing
 from ..job.history import Step
 from ..job.listing import effects_of

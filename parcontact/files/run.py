@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..doubts import Doubt
 from ..effects.effect import Detached, columns_of
-from ..errors import DONE, STOPPED_EARLY, InputError, RunError
+from ..errors import DONE, STOPPED_EARLY, Doubt, InputError, RunError
 from ..job import Job, Rough, RoughSpectrum, listing
 from ..job.advice import describe_sample
 from ..job.history import ChosenSteps, Timeline, reached
@@ -200,8 +199,8 @@ class Run:
         self._log_cycles()
         if self.march.scene.energy is not None:
             console.say(_describe_energies(row))
-        for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
-            console.say(line)
+        for text in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
+            console.say(text)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
@@ -214,11 +213,11 @@ class Run:
         if "below a cell" in self.contacts.seen:
             console.say("no error is stated for steps whose spots of contact may be smaller than a cell")
         for name, effect in self.march.scene.effects.items():
-            for text in effect.last_lines(self.march.state.memories[name]):
-                if isinstance(text, Doubt):
-                    console.warn(str(text), shown=self.options.shows(text))
+            for line in effect.last_lines(self.march.state.memories[name]):
+                if isinstance(line, Doubt):
+                    console.warn(str(line), shown=self.options.shows(line))
                 else:
-                    console.say(text)
+                    console.say(line)
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..doubts import Doubt
+from ..errors import Doubt
 from ..job import Checkpoint
 from ..parallel.root import Signals
 from ..parallel.slab import Slab

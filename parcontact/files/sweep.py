@@ -8,8 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TextIO
 
-from ..doubts import Doubt
-from ..errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, InputError, InUseError, RunError
+from ..errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, Doubt, InputError, InUseError, RunError
 from ..job import Case, Job
 from ..job.listing import plain_job
 from ..job.reading import CASES

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
-from ..doubts import Doubt
+from ..errors import Doubt
 from ..job import Case, Job
 from ..printed import name_cases
 

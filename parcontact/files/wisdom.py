@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import errors
+from .. import compiled
 from ..parallel import fft
 from ..parallel.fft import export_wisdom, import_wisdom, pyfftw
 from ..parallel.slab import Slab
@@ -67,7 +67,7 @@ def _adopt(data: bytes, slab: Slab) -> bool:
 
 def _place(transforms: Sequence[Any], slab: Slab) -> Path | None:
     """Return the file of wisdom for this kind of machine and these transforms, None without a safe directory."""
-    directory = errors.directory("plans")
+    directory = compiled.directory("plans")
     made_by = b"".join(Path(path).read_bytes() for path in (fft.__file__,))
     facts = [platform.machine(), processor(), pyfftw.fftw_version, zlib.crc32(made_by)]
     facts += [slab.comm.size, *transforms]

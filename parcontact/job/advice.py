@@ -27,7 +27,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple, Protocol
 
-from ..doubts import Doubt, Kind
+from ..errors import Doubt, Kind
 from ..printed import per_cent
 from .calculation import Accuracy, Grid, Numerics, Output
 from .materials import AnyMaterial

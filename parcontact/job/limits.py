@@ -15,8 +15,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from ..doubts import Doubt, Kind
-from ..errors import InputError
+from ..errors import Doubt, InputError, Kind
 from .advice import SAME_LENGTH, Sections, doubt_size, has_wave, one_cell
 from .calculation import FIELDS_NEED, Grid, Numerics, Output, Study
 from .materials import AnyMaterial, heated

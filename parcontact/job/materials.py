@@ -13,8 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
-from ..doubts import SAID, Doubt
-from ..errors import InputError
+from ..errors import SAID, Doubt, InputError
 from ..rubber import compound
 from ..rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical
 from ..rubber.shift import Shift as Law

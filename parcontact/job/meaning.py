@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
 
-from ..doubts import Doubt, Kind
+from ..errors import Doubt, Kind
 from ..rubber.shift import doubt_kelvin
 from . import limits
 from .advice import Sections, doubts_of_resolution

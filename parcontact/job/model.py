@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from ..doubts import SAID, Doubt
+from ..errors import SAID, Doubt
 from . import advice, limits, listing, meaning, surfaces
 from .calculation import BAND_RULES, Checkpoint, Grid, Numerics, Output, SomeBands, Study
 from .materials import Dma, Material, Zener, describe_temperature, heated

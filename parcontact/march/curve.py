@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 from .. import streams
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
-from ..doubts import Doubt, Kind
-from ..errors import DONE, FAILED, STOPPED_EARLY, InputError, RunError, UnsolvedError
+from ..errors import DONE, FAILED, STOPPED_EARLY, Doubt, InputError, Kind, RunError, UnsolvedError
 from ..files import files, hdf5, outputs, tables, wisdom
 from ..files.directory import ADVICE, Directory
 from ..files.fields import SteadyMaps

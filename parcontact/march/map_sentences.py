@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..doubts import Doubt, Kind
+from ..errors import Doubt, Kind
 from ..job import Topography, measured_maps
 from ..job.map_files import Map
 from ..job.measured_maps import Prepared

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..doubts import Doubt, Kind
 from ..effects.relaxation import time_factor_of
+from ..errors import Doubt, Kind
 from ..job import Job, Zener
 from ..job.meaning import excited_band
 from ..rubber.shift import doubt_kelvin

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import job as jobs
-from ..doubts import Doubt
+from ..errors import Doubt
 from ..job import Grid, Job, meaning
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.root import on_root

@@ -10,8 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ..doubts import Doubt, Kind
-from ..errors import InputError, JobError, RunError
+from ..errors import Doubt, InputError, JobError, Kind, RunError
 from ..job import Job, OnOneMesh, Output, advice, limits, meaning
 from ..job.advice import more_points
 from ..job.history import Timeline

@@ -21,8 +21,7 @@ from ..contact.preconditioner import grids_for
 from ..contact.problem import Box, Contact, reachable_certificate
 from ..contact.projected import FreeSteadySolver
 from ..contact.splitting import SteadySolver
-from ..doubts import Doubt
-from ..errors import UnsolvedError
+from ..errors import Doubt, UnsolvedError
 from ..files.checkpoint import Contents
 from ..job import Job
 from ..job.listing import answers

@@ -66,11 +66,11 @@ def _interfaces(name: str) -> ModuleType:
 
 
 if "pyfftw" in sys.modules:
-    import pyfftw
+    import pyfftw as pyfftw  # for others, too
 else:
     sys.modules[INTERFACES] = ModuleType(INTERFACES)  # a placeholder while pyfftw is imported
     try:
-        import pyfftw
+        import pyfftw as pyfftw
     finally:
         del sys.modules[INTERFACES]
     vars(pyfftw).pop("interfaces", None)

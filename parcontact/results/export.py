@@ -13,8 +13,7 @@ from typing import Any
 
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
-from ..doubts import Doubt
-from ..errors import InputError
+from ..errors import Doubt, InputError
 from ..files import files, tables
 from ..files.provenance import PROGRAM
 from ..files.tables import Wanted

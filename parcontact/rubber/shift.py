@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import TEMPERATURES
-from ..doubts import Doubt, Kind
-from ..errors import InputError
+from ..errors import Doubt, InputError, Kind
 from ..text_tables import read_named_columns
 
 GAS = 8.314462618  # physics: J/(mol K)

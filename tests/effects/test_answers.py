@@ -36,7 +36,7 @@ ANSWERS = """
         yield Panel("wear", along.axis, Axis("wear", "m"), along.series({"": run.columns["wear_depth"]}))
 
     def last_lines(self, memory):
-        from parcontact.doubts import Kind
+        from parcontact.errors import Kind
 
         worn, allowed = float(memory[1]), 1e-15
         yield "the tread was worn"

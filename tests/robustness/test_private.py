@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import outside
 
-from parcontact import errors
+from parcontact import compiled
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
 BIN = Path(sys.executable).parent
@@ -20,60 +20,60 @@ as_others = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be someb
 
 
 def test_a_private_directory_is_made(cache: Path) -> None:
-    place = errors.directory("plans")
+    place = compiled.directory("plans")
     assert place == cache / "parcontact" / "plans"
     assert place.stat().st_mode & 0o777 == 0o700
-    assert errors.directory("plans") == place
+    assert compiled.directory("plans") == place
 
 
 def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A home that does not exist is not made; where HOME is unset the system knows it."""
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "absent"))
-    assert errors.directory("plans") is None
+    assert compiled.directory("plans") is None
     assert not (tmp_path / "absent").exists()
     monkeypatch.setenv("HOME", "/dev/null")
-    assert errors.directory("plans") is None
+    assert compiled.directory("plans") is None
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert errors.directory("plans") == tmp_path / ".cache" / "parcontact" / "plans"
+    assert compiled.directory("plans") == tmp_path / ".cache" / "parcontact" / "plans"
 
 
 def test_a_directory_that_others_could_fill(cache: Path) -> None:
     place = cache / "parcontact" / "plans"
     place.mkdir(parents=True)
     place.chmod(0o755)  # others could only read
-    assert errors.directory("plans") == place
+    assert compiled.directory("plans") == place
     assert place.stat().st_mode & 0o777 == 0o700
     for mode in (0o770, 0o702, 0o777):
         place.chmod(mode)
-        assert errors.directory("plans") is None
+        assert compiled.directory("plans") is None
 
 
 def test_a_directory_that_others_could_replace(cache: Path) -> None:
     place = cache / "parcontact" / "plans"
-    assert errors.directory("plans") == place
+    assert compiled.directory("plans") == place
     cache.chmod(0o777)
-    assert errors.directory("plans") is None
+    assert compiled.directory("plans") is None
     cache.chmod(0o1777)  # sticky: entries are their owners'
-    assert errors.directory("plans") == place
+    assert compiled.directory("plans") == place
 
 
 def test_a_link_is_no_directory(cache: Path, tmp_path: Path) -> None:
     (cache / "parcontact").mkdir(parents=True)
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     (cache / "parcontact" / "plans").symlink_to(tmp_path / "elsewhere")
-    assert errors.directory("plans") is None
+    assert compiled.directory("plans") is None
 
 
 @as_others
 def test_a_directory_of_somebody_else(cache: Path) -> None:
-    place = errors.directory("plans")
+    place = compiled.directory("plans")
     assert place is not None
     for prepared in (place, place.parent, cache):
         os.chown(prepared, NOBODY, NOBODY)
-        assert errors.directory("plans") is None
+        assert compiled.directory("plans") is None
         os.chown(prepared, 0, 0)
-    assert errors.directory("plans") == place
+    assert compiled.directory("plans") == place
 
 
 # -- as another user --------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...columns import added_by
 from ...contact.problem import Mask
-from ...doubts import Doubt, Kind
+from ...errors import Doubt, Kind
 from ...job import limits
 from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Sphere, Wave

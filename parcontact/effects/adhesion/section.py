@@ -31,7 +31,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
-from ...doubts import Doubt, Kind
+from ...errors import Doubt, Kind
 from ...job import meaning
 from ...job.advice import more_points
 from ...job.calculation import Grid

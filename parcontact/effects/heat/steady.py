@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...contact.problem import Box, Mask
-from ...doubts import Doubt, Kind
-from ...errors import InputError, UnsolvedError
+from ...errors import Doubt, InputError, Kind, UnsolvedError
 from ...job import Job, Zener
 from ...march.point import Point
 from ...march.scene import Setup

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ... import capabilities
 from ...columns import added_by
-from ...doubts import Doubt, Kind
+from ...errors import Doubt, Kind
 from ...job import limits
 from ...job.parts import Flag, Part, Positive, Rule, rules_of
 from ...job.surfaces import Rough, RoughSpectrum, Topography

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from ...doubts import Doubt, Kind
+from ...errors import Doubt, Kind
 from ...job import limits
 from ...job.advice import more_points
 from ...job.parts import Part, Positive, rules_of

@@ -32,8 +32,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...doubts import Doubt, Kind
-from ...errors import RunError
+from ...errors import Doubt, Kind, RunError
 from ...march.point import Point, count_octaves, in_rounds
 from ...march.scene import Setup
 from ...parallel.fft import Spectrum

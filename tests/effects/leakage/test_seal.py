@@ -19,7 +19,7 @@ from parcontact.effects.leakage.over_time import load_curve
 
 from .test_total_load import AMPLITUDE, CLOSING, LENGTH, MODULUS, exact, gap
 
-pytestmark = pytest.mark.filterwarnings("ignore::parcontact.doubts.ParcontactWarning")  # small samples
+pytestmark = pytest.mark.filterwarnings("ignore::parcontact.errors.ParcontactWarning")  # small samples
 Json = dict[str, Any]
 Map = NDArray[np.float64]
 SHAPE: Json = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-4, "short_wavelength": 5e-5, "rms_slope": 0.3}

@@ -11,9 +11,9 @@ from marched_jobs import marched
 from mpi4py import MPI
 
 from parcontact.door.simulation import Simulation
-from parcontact.doubts import ParcontactWarning
 from parcontact.effects.stick import effect
 from parcontact.effects.stick.solver import ShearOperator
+from parcontact.errors import ParcontactWarning
 from parcontact.job import Job
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5
