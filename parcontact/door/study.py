@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
-from ..errors import FAILED, STOPPED_EARLY, InputError
+from ..errors import BAD_INPUT, FAILED, STOPPED_EARLY, InputError
 from ..files import files, outputs, run, sweep, sweep_warnings, tables
 from ..files.directory import Directory
 from ..files.stopping import Options
@@ -388,7 +388,11 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     return [*lines, f"the error of the reference, to which they are compared, {known}"]
 
 
-ENDS = {STOPPED_EARLY: "stopped early; run again to go on", FAILED: "some cases failed: there is no limit"}
+ENDS = {
+    STOPPED_EARLY: "stopped early; run again to go on",
+    FAILED: "some cases failed: there is no limit",
+    BAD_INPUT: "all cases were refused",
+}
 Errors = Mapping[Settings, Mapping[str, float]]
 
 
@@ -405,6 +409,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     with directory.claimed():
         plain = plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
+        known = slab.agree(directory.claim is not None)
         directory.make(job.path, job.resolved(), outputs.Claim(outputs.kept(plain)))
         several = list(cases.values())
         shown = on_root(slab.comm, lambda: sweep_warnings.warn_once(several))
@@ -415,6 +420,8 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
             return run.run_job(one, own, Options(True, sweep_stop_file=stop, shows=shows))
 
         code = sweep.SweepRun(several, Groups(slab.comm), act, stop, quiet, shown=shown).run(several)
+        if code == BAD_INPUT and not known:
+            directory.withdraw(job.path)
         lines = [] if code else on_root(slab.comm, lambda: conclude(job, refined, cases, slab.comm.size))
         if slab.root and not quiet:
             print(*lines, ENDS.get(code, f"study: {directory.path}"), sep="\n", flush=True)

@@ -91,6 +91,21 @@ class Directory:
 
         self._on_root(act)
 
+    def withdraw(self, job: Path) -> None:
+        """Remove the files that `make` has written for the file of a job, which stays; collective."""
+
+        def act() -> None:
+            del self.claims[self.verb]
+            for name in self.outputs.copies:
+                if not _same(self.path / name, job):
+                    (self.path / name).unlink()
+            if self.claims:
+                outputs.write_claims(self.path, self.claims)
+            else:
+                (self.path / outputs.MARKER).unlink()
+
+        self._on_root(act)
+
     def clear(self) -> None:
         """Remove files of earlier runs of this command; collective. Call it after `make`, which renames foreign
         files."""

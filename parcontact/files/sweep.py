@@ -53,6 +53,11 @@ class SweepRun:
         """Return the warnings of this group of ranks."""
         return SweepWarnings(self.shown, at_once=self.groups.count == 1)
 
+    @cached_property
+    def _refusals(self) -> dict[int, str]:
+        """Return why cases of this group were refused, by their numbers."""
+        return {}
+
     def run(self, chosen: Sequence[Case]) -> int:
         """Run the selected cases and collect the results of all cases; returns the exit code.
 
@@ -64,12 +69,18 @@ class SweepRun:
         """
         with Signals().noted() as signals:  # also on waiting ranks, whose end would end the others
             ends = self._take(_deal(chosen, self.groups), signals)
-            found = self.groups.from_all((ends, self.doubts.kinds))
-        codes = [code for ends, _ in found for code in ends]
+            found = self.groups.from_all((ends, self._refusals, self.doubts.kinds))
+        codes = [code for ends, *_ in found for code in ends]
         refused = set(codes) == {BAD_INPUT}
         if self.groups.root:
             self.stop.forget_own()
-            for text in self.doubts.summary([kinds for _, kinds in found]):
+            refusals = {number: reason for _, some, _ in found for number, reason in some.items()}
+            begun = not refused or (_directory(self.cases) / outputs.SWEEP.table).is_file()
+            if refusals and self.runs and begun:  # nothing is written if no case has ever run
+                for number, reason in refusals.items():
+                    sweep_table.fail(self.cases[number], reason)
+                self._collect()
+            for text in self.doubts.summary([kinds for *_, kinds in found]):
                 print_line(f"warning: {text}", sys.stderr)
             if STOPPED_EARLY not in codes and not self.quiet and not refused:
                 print_line(f"results of all cases: {Results(_directory(self.cases), 'sweep').points}")
@@ -110,7 +121,7 @@ class SweepRun:
                 print_line(f"{case} (of {len(self.cases)})")
             ended = self._attempt(case, slab, alone=not side_by_side and len(own) == 1)
             codes.append(ended)
-            if slab.root and (self.runs or ended != BAD_INPUT) and self._collect() == FAILED:
+            if slab.root and ended != BAD_INPUT and self._collect() == FAILED:
                 codes.append(FAILED)
             if speaks and side_by_side:
                 print_line(f"case {case.number}: {ENDS[ended]}")
@@ -158,7 +169,9 @@ class SweepRun:
             return ELSEWHERE
         except (InputError, RunError) as error:
             code, reason = BAD_INPUT if isinstance(error, InputError) else FAILED, str(error)
-        if slab.root and self.runs:
+        if code == BAD_INPUT:
+            self._refusals[case.number] = reason
+        elif slab.root and self.runs:
             sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
         if slab.root and reason:
             print_line(f"parcontact: case {case.number}: {reason}", sys.stderr)

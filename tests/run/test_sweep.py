@@ -114,6 +114,9 @@ def test_a_sweep_is_bad_input_if_all_of_its_cases_are(
 
     assert go(cases, act) == code
     assert len(begun) == 6
+    written = cases[0].job.output.directory.parent.parent.exists()
+    assert written == (code != 2)
+    assert not written or [row["state"] for row in table()].count("failed") == len(refused)
 
 
 def test_a_refused_theory_of_a_sweep_writes_nothing(

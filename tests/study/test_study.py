@@ -288,6 +288,21 @@ def test_a_case_that_cannot_be(main: Main, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_a_study_whose_cases_are_all_refused_writes_nothing(
+    main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(job: Job, slab: Slab, options: Options) -> int:
+        raise InputError("this surface has no heights")
+
+    monkeypatch.setattr(runner, "run_job", refuse)
+    job = tmp_path / "wave.yaml"
+    job.write_text(WAVE)
+    code, _, err = main("study", job)
+    assert code == 2
+    assert err.count("this surface has no heights") == 10
+    assert not (tmp_path / "out").exists()
+
+
 # -- which cases a study has, and what they change in a job -----------------------------------------------------------
 
 TEXT = """
