@@ -3,7 +3,6 @@
     a^3 = 3 W R / (4 E*),   d = a^2/R,   p(r) = (2 E*/(pi R)) sqrt(a^2 - r^2),   E* = 2 G/(1 - nu)
 
 with contact radius a, force W, radius of the sphere R, approach d, pressure p, shear modulus G and Poisson ratio nu.
-Source: K. L. Johnson, Contact Mechanics (1985), section 4.2. Arguments are in SI units and broadcast.
 
 On a viscoelastic half-space, without sliding, the elastic solution holds while the contact grows, with its products
 replaced by history integrals (J creep compliance, G relaxation function):
@@ -11,11 +10,12 @@ replaced by history integrals (J creep compliance, G relaxation function):
     a^2 = R d,   a^3(t) = (3 R/16) int J(t-s) dW(s),   W(t) = (16/(3 R)) int G(t-s) d a^3(s),
     p(r, t) = (8/(pi R)) int G(t-s) d sqrt(a^2(s) - r^2)_+
 
-While the contact shrinks, its radius at the time t equals the radius at an earlier time t1(t), given by int_{t1}^t
-G(t-s) d'(s) ds = 0, and the integral for W ends at t1; contact is lost when t1 = 0.
+While the contact shrinks, its radius at the time t equals the radius at an earlier time t1(t). This time follows from
+int_{t1}^t G(t-s) d'(s) ds = 0, and the integral for W ends at t1. Contact is lost when t1 = 0.
 
-Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The
-body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays.
+Sources: K. L. Johnson, Contact Mechanics (1985), section 4.2; E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438;
+T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. A viscoelastic body is incompressible and at rest before t = 0. Arguments
+are in SI units and broadcast; for a viscoelastic body, only times and distances may be arrays.
 """
 
 import numpy as np
@@ -33,17 +33,18 @@ def contact_modulus(shear_modulus: Values, poisson: Values = 0.5) -> Array:
 
 
 def contact_radius(force: Values, radius: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """Return a = (3 W R/(4 E*))^(1/3) [m]."""
+    """Return the contact radius a = (3 W R/(4 E*))^(1/3) [m] under a force [N]."""
     return np.cbrt(3 * force * radius / (4 * contact_modulus(shear_modulus, poisson)))
 
 
 def approach(force: Values, radius: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """Return d = a^2/R [m], the depth of the sphere's lowest point below the undeformed surface."""
+    """Return the approach d = a^2/R [m] under a force [N]: the depth of the sphere's lowest point below the undeformed
+    surface."""
     return contact_radius(force, radius, shear_modulus, poisson) ** 2 / radius
 
 
 def force(approach: Values, radius: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """Return W = (4/3) E* sqrt(R) d^(3/2) [N] for an approach d [m]; 0 for d < 0."""
+    """Return the force W = (4/3) E* sqrt(R) d^(3/2) [N] for an approach d [m]; 0 for d < 0."""
     depth = np.maximum(approach, 0)
     return 4 / 3 * contact_modulus(shear_modulus, poisson) * np.sqrt(radius * depth) * depth
 
@@ -77,10 +78,12 @@ def displacement(r: Values, force: Values, radius: Values, shear_modulus: Values
 
 def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
     """Return the force W(t) [N] at times t >= 0 [s], any shape, for an approach that rises linearly in `rise_time` to
-    `peak_approach` and falls at the same rate; 0 after lift-off.
+    `peak_approach` and falls at the same rate. The force is 0 after lift-off.
 
-    W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds, where every term of the Prony series
-    gives (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) with Kummer's function M.
+        W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds
+
+    with the time t1 during the rise at which the contact was as large as at t. A term of the Prony series with the time
+    tau contributes (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) to the integral, with Kummer's function M.
     """
     spring, terms, times = normal_form(*material)
     earlier = _time_of_equal_radius(t, rise_time, spring, terms, times)
@@ -91,8 +94,8 @@ def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius:
 
 
 def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
-    """Return the time [s] at which a contact with the approach of `triangle_force` is lost: int_0^t G = 2 int_0^{t -
-    rise_time} G, for any sphere and depth."""
+    """Return the time [s] at which contact is lost if the approach rises and falls as in `triangle_force`. It solves
+    int_0^t G = 2 int_0^{t - rise_time} G, and does not depend on the sphere and the depth."""
     series = normal_form(*material)
 
     def excess(t: float) -> float:

@@ -1,8 +1,9 @@
 """Persson's theory: contact area and friction of a rough surface that slides on a viscoelastic half-space.
 
-If waves up to the wavenumber k are included, the pressure in full contact has the variance Var p(k), and its
-distribution spreads from its mean p0; points with tension are not in contact. With the transfer modulus M of each wave
-as in `wavy` (G* in steady sliding, functions of time in any other history) and <h^2> = int Phi d2q/(4 pi^2):
+With waves up to the wavenumber k only, the pressure in full contact would have the variance Var p(k) over the surface.
+Around its mean p0 the distribution of the pressure broadens as k grows, and points with tension are not in contact.
+With the transfer modulus M of each wave as in `wavy` (G* in steady sliding, functions of time in any other history) and
+<h^2> = int Phi d2q/(4 pi^2):
 
     Var p(k) = int_{|q| < k} Phi 4 q^2 |M|^2 d2q/(4 pi^2)
     A(k)/A0 = P(k) = erf(p0/sqrt(2 Var p(k)))
@@ -12,24 +13,24 @@ as in `wavy` (G* in steady sliding, functions of time in any other history) and 
 The theory is exact in full contact, where P = 1. Otherwise it is an approximation, in which an empirical factor gamma
 corrects the friction (1: no correction).
 
-Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; with time B. N. J. Persson and A. I. Volokitin, Phys. Rev. B
-65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102, as in Sec. 3.1
-of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". That paper prints
-no formula of the theory. The steady form above is the published form; in transients, M is taken from full contact, and
-P is taken at the present time. A theory with P inside the integral over the past would differ only in transients of
-partial contact.
+Source: for steady sliding B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; for histories B. N. J. Persson and A. I.
+Volokitin, Phys. Rev. B 65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27
+(2015) 105102. Sec. 3.1 of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
+half-space" uses the theory and prints no formula of it. Steady sliding is computed here as published. In transients,
+this module takes M from full contact and P at the present time. A theory could also weight the past motion, on which M
+depends, with the P of that time; it would differ only in transients of partial contact.
 
-Integrals are sums over waves in `Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and `mean_pressure`
-(p0, Pa) has the shape of the other axes; SI units.
+Integrals are sums over waves in `Rings`. The argument `modulus` (M, Pa) has one entry per wave on its last axis, and
+`mean_pressure` (p0, Pa) has the shape of the other axes. All are in SI units.
 
 Rings hold waves of equal wavenumber, of a spectrum or of a given surface. An isotropic spectrum is integrated by
-Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2): the share in contact falls like the root of
-log(k/smallest) at small areas, which is smooth in x. Partial sums within a ring follow from the polynomial through the
-points of its panel, so that sums and partial sums have the same errors.
+Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2). At small areas the share in contact falls like
+the root of log(k/smallest), and this root is a smooth function of x. Partial sums within a ring follow from the
+polynomial through the points of its panel, so that sums and partial sums have the same errors.
 
 Histories have piecewise constant velocities: rest, starts, stops, reversals, changes of load. In the transfer modulus M
-of a wave (see `wavy`) every term of the relaxation function has a memory m_j of the way in which the wave has
-passed a point of the body. For constant omega = q . v and a memory m_j(0) at t = 0,
+of a wave (see `wavy`) every term of the relaxation function has a memory m_j of how the wave has moved past a point of
+the body. For constant omega = q . v and a memory m_j(0) at t = 0,
 
     M(t) = G_inf + sum_j G_j m_j(t)
     m_j(t) = b_j + (m_j(0) - b_j) exp(-t/tau_j - i omega t),    b_j = i omega tau_j/(1 + i omega tau_j)
@@ -37,8 +38,8 @@ passed a point of the body. For constant omega = q . v and a memory m_j(0) at t 
 exactly, for any t. At first contact a body has m_j = 1 (its instantaneous modulus), in steady sliding m_j = b_j.
 Contact area and friction follow from M and the load at each instant.
 
-Assumption: from first contact on the wave in full contact follows the surface, and a load p0(t) that changes or
-vanishes only changes the share in contact.
+The theory assumes that the body follows each wave of the surface from first contact on, as in full contact. A load
+p0(t) that changes or vanishes only changes the share in contact.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -68,10 +69,12 @@ CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten a
 
 @dataclass(frozen=True)
 class Rings:
-    """Waves of a surface in rings of equal wavenumber, from the longest; `starts` is the first wave of each ring.
+    """Waves of a surface in rings of equal wavenumber, in the order of rising wavenumbers. `starts` has the index of
+    the first wave of each ring.
 
-    Rings are grouped in panels of n; `share[i, j]` is the share of ring j of a panel that lies within ring i.
-    `stiffness` is the ratio of the body's stiffness to that of a half space for each wave.
+    Each panel has n rings, and `share` has the shape (n, n): sums up to the wavenumber of ring i of a panel contain the
+    part `share[i, j]` of the sum over ring j of the panel. `stiffness` is the ratio of the body's stiffness to that of
+    a half space for each wave.
     """
 
     waves: Waves
@@ -80,7 +83,7 @@ class Rings:
     stiffness: NDArray[np.floating] | float = 1.0
 
     def scaled(self, factor: float) -> "Rings":
-        """Return the surface with heights multiplied by a factor."""
+        """Return the rings of the surface with heights multiplied by a factor."""
         amplitude, kx, ky = self.waves
         return replace(self, waves=Waves(factor * amplitude, kx, ky))
 
@@ -89,7 +92,8 @@ class Rings:
         return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
 
     def within(self, own: Array) -> Array:
-        """Return sums up to the wavenumber k of each ring, from the sums `own` of the rings; both (..., rings)."""
+        """Return sums up to the wavenumber of each ring, shape (..., rings). `own` has the sum over each ring alone, in
+        the same shape."""
         panels = own.reshape(*own.shape[:-1], -1, len(self.share))
         totals = panels.sum(axis=-1)
         before = np.cumsum(totals, axis=-1) - totals
@@ -97,7 +101,8 @@ class Rings:
 
 
 def rings_of_surface(waves: Waves) -> Rings:
-    """Return the rings of given waves (`wavy.waves`). Half of the sum of a ring counts as within it."""
+    """Return the rings of given waves (`wavy.waves`). A sum up to the wavenumber of a ring contains half of the sum
+    over this ring."""
     k = np.hypot(waves.kx, waves.ky)
     order = np.argsort(k)
     starts = np.flatnonzero(np.diff(k[order], prepend=-np.inf) > EQUAL * k.max(initial=0.0))
@@ -115,9 +120,10 @@ def rings_of_spectrum(
 ) -> Rings:
     """Return waves that represent an isotropic spectrum Phi(k) [m^4] between two wavenumbers [rad/m].
 
-    `distance` [m] is the largest displacement that the body remembers: neighbouring waves of the sums must stay in
-    phase, up to MAX_PHASE. `kinks` [rad/m] are wavenumbers where Phi is not smooth. Panels and angles are divided by
-    `refinement`, to test the error of the sums.
+    `distance` [m] is the largest distance between two positions of the surface while the body remembers both. Panels
+    and angles are so fine that neighbouring waves stay in phase over this distance, but at most over the distance at
+    which the shortest wave has the phase MAX_PHASE. `kinks` [rad/m] are wavenumbers where Phi is not smooth. Panels and
+    angles are divided by `refinement`, to test the error of the sums.
     """
     logarithm = np.log(largest / smallest)
     nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
@@ -164,7 +170,8 @@ def _partial_shares(nodes: Array, weights: Array) -> Array:
 
 
 def contact_share(mean_pressure: Values, rings: Rings, modulus: ComplexValues) -> Array:
-    """Return P(k) at each ring: the area in contact divided by the nominal area, with waves up to the ring's k."""
+    """Return P(k) at the wavenumber of each ring, shape (..., rings): the area in contact divided by the nominal area,
+    with waves up to this wavenumber."""
     return _share(mean_pressure, rings.within(_variances(rings, modulus)))
 
 
@@ -185,7 +192,8 @@ def traction(mean_pressure: Values, rings: Rings, modulus: ComplexValues, gamma:
 def friction_coefficient(
     mean_pressure: Values, rings: Rings, vx: float, vy: float, modulus: ComplexValues, gamma: float = GAMMA
 ) -> Array:
-    """Return the friction coefficient mu with all waves for sliding at (vx, vy) [m/s], not 0."""
+    """Return the friction coefficient mu of the surface with all its waves, which slides at the velocity (vx, vy)
+    [m/s], not 0."""
     along = traction(mean_pressure, rings, modulus, gamma) @ np.array([vx, vy])
     return np.asarray(-along / (np.hypot(vx, vy) * mean_pressure))
 
@@ -204,8 +212,8 @@ def _share(mean_pressure: Values, variance: Array) -> Array:
 
 
 class SlidingLeg(NamedTuple):
-    """A part of a history at constant velocity [m/s]: duration [s], instants since its start [s], and p0 [Pa] at
-    these."""
+    """A part of a history at constant velocity [m/s]: its duration [s], instants since its start [s], and p0 [Pa] at
+    these instants."""
 
     velocity: tuple[float, float]
     duration: float
@@ -214,13 +222,15 @@ class SlidingLeg(NamedTuple):
 
 
 class TheoryOutcome(NamedTuple):
-    """Results at instants: traction <p grad h> [Pa], shape (instants, 2), and contact area A/A0, shape (instants,)."""
+    """Predictions at the instants of a leg: traction <p grad h> [Pa], shape (instants, 2), and contact area A/A0, shape
+    (instants,)."""
 
     traction: Array
     contact_area: Array
 
     def friction(self, pressures: Array) -> Array:
-        """Return the tangential force divided by the normal force, not negative; 0 without load."""
+        """Return the magnitude of the tangential force divided by the normal force, under the mean `pressures` [Pa] at
+        the instants; 0 without load."""
         size = np.hypot(*self.traction.T)
         return np.divide(size, pressures, out=np.zeros_like(size), where=pressures > 0)
 
@@ -239,7 +249,8 @@ class Memory:
         self.shares = self._steady(self._frequency(velocity))
 
     def moduli(self, velocity: tuple[float, float], instants: Array) -> ComplexArray:
-        """Return M [Pa] at instants [s] of sliding at a velocity: shape (instants, waves)."""
+        """Return M [Pa] at instants [s] of sliding at a velocity, shape (instants, waves). The memory stays as it
+        is."""
         omega = self._frequency(velocity)
         steady = self._steady(omega)
         fading = np.exp(-instants[:, None] / self.times) @ (self.terms * (self.shares - steady)).T
@@ -262,7 +273,8 @@ class Memory:
 
 
 def follow(memory: Memory, legs: Iterable[SlidingLeg], gamma: float = GAMMA) -> Iterator[TheoryOutcome]:
-    """Yield the results for each part of a history, one after the other; `memory` is advanced."""
+    """Yield the predictions for each of the `legs` of a history, one after the other. Each leg advances the `memory` to
+    its end."""
     for leg in legs:
         count = max(1, CHUNK // max(1, len(memory.shares)))
         starts = range(0, max(1, leg.instants.size), count)

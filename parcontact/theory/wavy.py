@@ -1,32 +1,36 @@
 """Rigid wavy surfaces on a half-space: one wave on an elastic body, and many waves in full contact.
 
 One wave, h(x) = Delta cos(2 pi x/lambda), is in partial or full contact with an elastic half-space (Westergaard). Its
-crests are at x = 0, ±lambda, ..., and p is the mean pressure. Contact is complete at p* = pi E* Delta/lambda. With
-s = min(p/p*, 1), psi = pi x/lambda and E* = 2 G/(1 - nu):
+crests are at x = 0, ±lambda, ..., and p is the mean pressure. Contact is complete at p* = pi E* Delta/lambda. With s =
+min(p/p*, 1), psi = pi x/lambda and E* = 2 G/(1 - nu):
 
     contact fraction  f = (2/pi) asin sqrt(s)
-    pressure          p(x) = 2 p* |cos psi| sqrt(s - sin^2 psi)_+               p + p* cos(2 psi) in full contact
+    pressure          p(x) = 2 p* |cos psi| sqrt(s - sin^2 psi)_+               partial contact
+                      p(x) = p + p* cos(2 psi)                                  full contact
     gap               g(x) = 2 Delta (y sqrt(y^2 - s) - s arcosh(y/sqrt(s))),   y = |sin psi| > sqrt(s)
-    mean gap          Delta (1 - s + s ln s)
+    mean gap          d = Delta (1 - s + s ln s)
 
-Source: H. M. Westergaard, J. Appl. Mech. 6 (1939) 49; K. L. Johnson, Contact Mechanics (1985), section 13.2. The gap
-is the integral of its slope outside the contact; the mean gap d follows from the elastic energy U per area, dU = -p dd.
+Source: H. M. Westergaard, J. Appl. Mech. 6 (1939) 49; K. L. Johnson, Contact Mechanics (1985), section 13.2. The gap is
+the integral of its slope outside the contact. The mean gap d follows from the elastic energy U per area by dU = -p dd.
 Arguments are in SI units and broadcast.
 
 Many waves slide in full contact with a viscoelastic half-space. This problem is linear, so that its solution is exact.
-The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
-Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
-of time after a change of velocity, and also a function of the time step for a time-stepping code. With k = |(kx, ky)|:
+The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], and has been
+displaced by (sx, sy). Each wave has a transfer modulus M. In steady sliding M is the complex modulus G*(omega) at omega
+= kx vx + ky vy. After a change of velocity M depends on time, and in a code that steps through time also on the time
+step. With k = |(kx, ky)|:
 
     pressure    p = p0 + sum Re[2 k A conj(M) exp(i (kx (x - sx) + ky (y - sy)))]
-    traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the surface per nominal area
+    traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the rigid surface per nominal area
     friction    mu = -traction . v/(|v| p0)
 
-valid while the pressure is positive everywhere. The pressure of a wave is ahead of the wave by the phase of M.
+These formulas hold while the pressure is positive everywhere. The pressure of a wave is ahead of the wave by the phase
+of M.
 
 Source: Eqs. (5) and (10) of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
-half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840. Wave arguments
-(`amplitude` in m, maybe complex, `kx`, `ky` in rad/m) have one entry per wave and broadcast; SI units.
+half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840. The arguments
+`amplitude` (in m, real or complex), `kx` and `ky` (in rad/m) have one entry for each wave, and broadcast. All are in SI
+units.
 """
 
 from typing import NamedTuple
@@ -64,7 +68,7 @@ def pressure(
     shear_modulus: Values,
     poisson: Values = 0.5,
 ) -> Array:
-    """Return p(x) [Pa] at distances x [m] from a crest; any x."""
+    """Return p(x) [Pa] at any distances x [m] from a crest."""
     full = full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     psi = np.pi * x / wavelength
     inside = np.maximum(mean_pressure / full - np.sin(psi) ** 2, 0)
@@ -108,7 +112,8 @@ def _fraction(load: Values) -> Array:
 
 
 class Waves(NamedTuple):
-    """Complex amplitudes [m] and wave vectors [rad/m] of real waves; of two opposite wave vectors, one is listed."""
+    """Complex amplitudes [m] and wave vectors [rad/m] of real waves, shape (waves,). Of two opposite wave vectors only
+    one is listed, as both belong to the same real wave."""
 
     amplitude: ComplexArray
     kx: Array
@@ -119,7 +124,8 @@ def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
     """Return the waves of a map of heights [m], shape (ny, nx), on a periodic rectangle of sides length_x and length_y
     [m].
 
-    The mean is left out. Raises ValueError for a wave of two points per period, whose heights do not define a slope.
+    The mean is left out. Raises ValueError for a wave of two points per period (Nyquist), whose heights do not define a
+    slope.
     """
     heights = np.asarray(heights, float)
     ny, nx = heights.shape
@@ -134,7 +140,7 @@ def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
 
 
 def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
-    """Return omega = kx vx + ky vy [rad/s], the frequency of a wave at a point of the body."""
+    """Return omega = kx vx + ky vy [rad/s], the angular frequency at which a wave passes a point of the body."""
     return np.asarray(kx * vx + ky * vy)
 
 
@@ -145,8 +151,8 @@ def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus
 
 
 def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
-    """Return <p grad h> = -sum k |A|^2 (kx, ky) Im M [Pa], shape (..., 2); the last axis of `modulus` (M) holds the
-    waves."""
+    """Return the force on the rigid surface per nominal area, <p grad h> = -sum k |A|^2 (kx, ky) Im M [Pa], shape (...,
+    2). `modulus` holds the transfer moduli M [Pa], and its last axis runs over the waves."""
     strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
     return -np.stack([np.sum(strength * kx, axis=-1), np.sum(strength * ky, axis=-1)], axis=-1)
 
@@ -154,7 +160,8 @@ def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexV
 def friction_coefficient(
     mean_pressure: Values, amplitude: ComplexValues, kx: Values, ky: Values, vx: float, vy: float, *material: *Moduli
 ) -> Array:
-    """Return mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves in steady sliding at (vx, vy) [m/s], not 0."""
+    """Return mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves in steady sliding at the velocity v = (vx, vy)
+    [m/s], which must not be 0."""
     modulus = complex_modulus(frequency(kx, ky, vx, vy), *material)
     return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
 
