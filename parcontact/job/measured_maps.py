@@ -1,16 +1,17 @@
 """Measured maps that are prepared for the box and the grid of a job, and measured spectra.
 
-A map is read, cut to the box, treated (levelled, filled, made periodic), and resampled to the grid.
+A map is read, cut to the box, treated (levelled, filled, made periodic), and resampled to the grid. Heights are arrays
+[m] of shape (ny, nx), with NaN at missing points.
 
-Maps have the shape (ny, nx); missing points are NaN.
+A measured spectrum is that of an isotropic surface: a table of C2D, the spectrum of the surface, or of C1D, the
+one-sided spectrum of profiles, at wavenumbers q = 2 pi/wavelength. Its columns are `q[1/m] C2D[m^4]` or `q[1/m]
+C1D[m^3]`, or the same in mm, um or nm. As in `physics.surface_statistics`, the mean square of the heights h is
 
-A measured isotropic spectrum is a table of C1D or C2D at wavenumbers q, from which the density of waves follows.
+    <h^2> = int C2D d2q = int_0^inf C1D dq,
 
-The columns are `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, or the same in mm, um or nm. As in `physics.surface_statistics`,
-q = 2 pi/wavelength, and C1D is the one-sided spectrum of profiles:
+and the density Phi of `physics.roughness`, by which random surfaces are made, is
 
-    <h^2> = int C2D d2q = int_0^inf C1D dq,        Phi = 4 pi^2 C2D, the density of `physics.roughness`,
-    C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq       (Abel's equation, with q = k cosh t)
+    Phi = 4 pi^2 C2D,    C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq    (Abel's equation).
 
 SurfaceTopography and contact.engineering write pi C1D and 4 pi^2 C2D (T. D. B. Jacobs, T. Junge, L. Pastewka, Surf.
 Topogr.: Metrol. Prop. 5 (2017) 013001): `normalisation: surface_topography` divides by these factors.
@@ -39,7 +40,7 @@ TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # number of terms of 
 
 @dataclass(frozen=True)
 class Treated:
-    """A map without missing points, the number of points that were `missing`, and a mask of `outliers`."""
+    """A map after `treat`: its heights [m], the number of missing points that were filled, and a mask of outliers."""
 
     heights: Array
     missing: int
@@ -47,8 +48,12 @@ class Treated:
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
-    """Return a map that is levelled, filled, without outliers if `clip`, and made periodic by `smooth`, by `mirror`
-    (which doubles both lengths) or not (`none`)."""
+    """Return a map that is levelled, filled and made periodic; if `clip` is True, outliers are replaced by the median
+    of their neighbours.
+
+    `detrend` is a key of TERMS. `periodic` is `smooth` (`make_periodic`), `mirror` (the map and its mirror images,
+    twice as long in both directions) or `none`.
+    """
     known = np.isfinite(heights)
     filled = fill(remove_trend(heights, known, detrend), known)
     odd, around = find_outliers(filled)
@@ -62,7 +67,8 @@ def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Tr
 
 
 def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Array:
-    """Return a map minus its mean, plane or paraboloid, fitted by least squares to known points."""
+    """Return a map minus a constant, a plane or a paraboloid, as `detrend` (a key of TERMS) says, that is fitted by
+    least squares to the points in the mask `known`."""
     y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in heights.shape), indexing="ij")
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[: TERMS[detrend]]
     trend = np.linalg.lstsq(terms[:, known].T, heights[known], rcond=None)[0]
@@ -87,8 +93,8 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
     """Return a mask of outliers, and the map of the medians of each point and its neighbours.
 
-    Outliers are points that differ from this median by more than OUTLIER times the median of such differences. Beyond
-    the edges of the map slopes are extrapolated.
+    Outliers are points that differ from this median by more than OUTLIER times the median of such differences. For
+    points at the edges the map is continued with the same slope.
     """
     around = scipy.ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
@@ -107,9 +113,9 @@ def is_periodic(heights: Array) -> bool:
 
 
 def make_periodic(heights: Array) -> Array:
-    """Return the map minus the smoothest map with the same jumps across its edges.
+    """Return the map minus its harmonic part, the smoothest map with the same jumps from edge to opposite edge.
 
-    This harmonic part is large only at the edges, so that slopes inside hardly change (L. Moisan, J. Math. Imaging Vis.
+    The harmonic part is large only at the edges, so that slopes inside hardly change (L. Moisan, J. Math. Imaging Vis.
     39 (2011) 161).
     """
     jumps = np.zeros_like(heights)
@@ -167,8 +173,8 @@ class Prepared:
 
 
 def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
-    """Return the map `found` of a job on the grid of the job; to be called on root only. Raises InputError for a map
-    that is smaller than the box."""
+    """Return the measured map `found` on the grid of the job, treated as the shape `part` says; to be called on root
+    only. Raises InputError for a map that is smaller than the box."""
     periodic = part.periodic or ("smooth" if any(grid.cyclic) else "none")
     copies = part.copies
     rows, columns = (
@@ -265,7 +271,8 @@ def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, f
 def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """Return the spectrum of an isotropic surface from a line scan, and its longest and shortest wavelengths [m].
 
-    C1D of the levelled scan is computed with Hann's window, and averaged in BINS bins per decade. Raises InputError.
+    C1D of the levelled scan is computed with Hann's window, and averaged over parts of each decade of wavenumbers
+    (BINS). Raises InputError.
     """
     heights, length = line.heights, line.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):

@@ -1,4 +1,4 @@
-"""The model of a job: frozen sections, in SI units. It needs no MPI and reads no maps."""
+"""The job as an object: its sections, in SI units, which do not change. It needs no MPI and reads no maps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ NO_GRID = {"points": 1, "size": 1.0}  # grid of a job with bands, which have the
 
 
 class Job(Part):
-    """A whole job; its sections have the same names as in the job file. Jobs are equal if all their keys are equal."""
+    """A whole job. Its sections have the same names as in the job file. Two jobs are equal if all their keys have equal
+    values."""
 
     title: str = Field(default="", description="text (put numbers in quotes)")
     grid: Grid = Field(description="a mapping with points and size")
@@ -52,8 +53,8 @@ class Job(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Return `data` with names of all stages, the kernel that suits the boundary, and an output directory that is
-        named after the job file."""
+        """Return the sections `data` with defaults where nothing is given: names of stages, the convolution kernel that
+        suits the boundary, and an output directory called after the job file."""
         data = prepared(data)
         if data.get("bands") is not None:
             data.setdefault("grid", dict(NO_GRID))
@@ -81,7 +82,7 @@ class Job(Part):
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """Return the names of all sections, including sections of this package's effects and `sweep`."""
+        """Return the names of all sections, including `sweep`, and the sections of this package's effects."""
         return (*dict.fromkeys((*super().words(), *listing.own_sections())), "sweep")
 
     def __eq__(self, other: object) -> bool:
@@ -95,7 +96,7 @@ class Job(Part):
         return self._origin
 
     def with_origin(self, origin: Origin) -> Job:
-        """Return the same job with another origin."""
+        """Return the same job with another origin (`parts.Origin`)."""
         copy = self.model_copy()
         copy._origin = origin
         return copy
@@ -127,7 +128,8 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """Return sentences on the temperature of the material, and on the meaning of effects' sections in this job."""
+        """Return sentences on the temperature of the material, and those of effects on what their sections mean for
+        this job."""
         material: Any = self.material.given
         return tuple(filter(None, (describe_temperature(material), *self._said("facts"))))
 
@@ -145,14 +147,14 @@ class Job(Part):
 
     @property
     def measured(self) -> bool:
-        """Return True if the material states its measured frequencies or temperatures."""
+        """Return True if the material states the range of frequencies or of temperatures in which it was measured."""
         body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
     @property
     def depends_on_heights(self) -> bool:
-        """Return True if warnings need the heights of the surface: to find its slope, or to compare them with an
-        approach or a length of an effect."""
+        """Return True if warnings need the heights of the surface: to find the slope of the surface, or to compare the
+        heights with an approach, or with a length such as the thickness of a layer."""
         compared = any(compares(self) for compares in self.asked("compares_heights"))
         compared |= any(stage.control == "approach" for stage in self.history)
         return compared or not meaning.says_all(self.surface)
@@ -169,7 +171,8 @@ class Job(Part):
         return getattr(self, name, None)
 
     def asked(self, name: str) -> list[Any]:
-        """Return the attribute `name` of each effect whose section the job has (`effects.effect.Effect`)."""
+        """Return the attributes called `name` of the classes of effects whose sections the job has (see
+        `effects.effect.Effect`); effects without the attribute are left out."""
         found = listing.effects_of(self._added_sections()).values()
         return [getattr(effect, name) for effect in found if hasattr(effect, name)]
 
@@ -178,18 +181,19 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Return True if the result depends on the history, because the body relaxes or an effect has a memory."""
+        """Return True if contacts depend on earlier ones, because the body relaxes or an effect has a memory."""
         return self.material.fitted.remembers or any(asked(self) for asked in self.asked("remembers"))
 
     @property
     def sheared_first(self) -> bool:
-        """Return True if an effect shears the contact before it slides."""
+        """Return True if an effect, such as sticking, shears the contact before the surface slides over it."""
         return any(asked(self) for asked in self.asked("sheared_first"))
 
     def resolved(self) -> str:
         """Return the job as YAML text with every default; loading the text returns an equal job.
 
-        Values that `numerics.accuracy` chose are comments, so that they are chosen again when the text is loaded.
+        Values that `numerics.accuracy` chose are written as comments, so that they are chosen again when the text is
+        loaded.
         """
         chosen = ", ".join(f"{name} {value!r}" for name, value in self.numerics.chosen.items())
         return dump(listing.plain_data(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
@@ -202,7 +206,7 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
     """Return the model of a job with the sections of effects, and with the keys that these effects add to stages.
 
-    A rule on the section of another effect applies only if the job has this section.
+    If a rule of one effect needs the section of another effect, it applies only to jobs that have both sections.
     """
     effects = listing.effects_of(sections)
     fields: dict[str, Any] = {
@@ -243,7 +247,7 @@ def __getattr__(name: str) -> Any:
 
 
 def prepared(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the data of a job with `surface` as a list of shapes, and with names of all stages."""
+    """Return the data of a job with `surface` as a list of shapes, and with names for stages that have none."""
     data = dict(data)
     if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
         data["surface"] = surfaces.with_shapes(data["surface"])
@@ -262,7 +266,8 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
 
 
 def describe_job(job: Job) -> str:
-    """Return a table of the job with every default and unit, followed by its cells and its duration."""
+    """Return a table of the job with every default and unit, followed by the lengths of a cell and by the duration of
+    the history."""
     rows = list(listing.rows(job))
     if job.bands is not None:
         return listing.layout(rows)

@@ -88,12 +88,12 @@ class Rule(NamedTuple):
 
 
 def rules_of(*checks: Callable[..., Iterator[Fault]]) -> tuple[Rule, ...]:
-    """Return the rules of checks whose parameters are named as the fields that they need."""
+    """Return a rule for each check; the parameters of a check have the names of the fields that it needs."""
     return tuple(Rule(tuple(signature(check).parameters), check) for check in checks)
 
 
 class Instead(NamedTuple):
-    """Advice for an unknown key, and the keys that are probably meant."""
+    """What a message says instead of an unknown key: advice, and the keys that are probably meant."""
 
     advice: str
     keys: tuple[str, ...] = ()
@@ -117,11 +117,11 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return this part as it was in the job, before effects replaced it."""
+        """Return this part as it was in the job, if an effect, such as softening of a material, has replaced it."""
         return self
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the keys that are not written to the stored job although they have a value."""
+        """Return the keys that stored jobs leave out although they have a value, such as the grid of a job in bands."""
         return ()
 
     @classmethod
@@ -333,7 +333,8 @@ def countable(value: int) -> int:
 
 
 def from_home(path: Path) -> Path:
-    """Replace a leading ~ or ~user of a path; refuse unknown users, and paths that are too long."""
+    """Return a path with the home directory in place of a leading ~ or ~user. Raises ValidationError for an unknown
+    user, and for a path that is too long."""
     if len(str(path)) > LONGEST_NAME or any(len(part.encode()) > 255 for part in path.parts):
         refuse(Fault(f"must be the name of a file, got {len(str(path))} characters, {shorten(str(path), 40)!r}"))
     try:
@@ -359,7 +360,7 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 def log_range(text: str) -> tuple[float, ...]:
     """Return n positive numbers from a to b, equally spaced in the logarithm, from a text `a:b:n`.
 
-    Raises ValueError with the end of a sentence "KEY must be ...".
+    Raises ValueError for another text; its message is the end of a sentence "KEY must be ...".
     """
     try:
         first, last, count = text.split(":")
@@ -376,7 +377,8 @@ def log_range(text: str) -> tuple[float, ...]:
 
 
 def bounded(value: float) -> float:
-    """Return a number; refuse one that would overflow in a run, in squares of slopes or quotients of lengths."""
+    """Return a number. Raises ValidationError for a number beyond SMALLEST and LARGEST, as squares of slopes or
+    quotients of lengths would overflow in a run."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         refuse(Fault(f"must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value

@@ -46,7 +46,8 @@ FIXED = ("sweep", "output.directory")  # keys that cannot be swept
 
 
 class Setting(NamedTuple):
-    """A value for a key, from a sweep, the command line or Python, with the places of key and value."""
+    """A value for a key, from a sweep, the command line or Python, with the places at which messages locate the key and
+    the value."""
 
     name: str
     value: Any
@@ -82,8 +83,8 @@ class Sweep:
 
 
 def take_sweep(source: Source) -> Sweep | None:
-    """Remove the sweep from the data of a job and return it. A sweep with mistakes, which `source` then has, is
-    returned as None."""
+    """Remove the sweep from the data of a job, and return it, or None for a sweep with mistakes. The mistakes are added
+    to those of `source`."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)
@@ -152,7 +153,7 @@ def _overlap(data: dict[str, Any], one: str, other: str) -> bool:
 
 
 def refuse_overrides(sweep: Sweep, overrides: list[Setting], source: Source) -> None:
-    """Note a mistake for each override of a key that is swept."""
+    """Add a mistake to `source` for each override of a key that is swept."""
     names = {setting.name for axis in sweep.axes for setting in axis[0]}
     for override in overrides:
         if found := next((swept for swept in names if _overlap(source.data, swept, override.name)), ""):
@@ -172,7 +173,7 @@ def read_job(
     """Return the data of a case of a job with its overrides and included materials, the files of these materials, and
     the sweep of the job, None if it has mistakes.
 
-    If `given`, this source replaces the file.
+    If a job is `given` as a source, no file is read.
     """
     source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]
@@ -256,7 +257,7 @@ def _dead_end(node: Any, shown: str, name: str) -> str:
 
 
 def materials() -> list[str]:
-    """Return the names of the sections that are materials."""
+    """Return the names of all sections that have the keys of a material: `material`, and those of effects."""
     return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
 
 
@@ -341,7 +342,7 @@ CASES = "cases"  # directory of all cases in the output directory of a job
 
 
 class Case(NamedTuple):
-    """A case of a sweep: its number, its settings of the swept keys, and its job, with an output directory of its own.
+    """A case of a sweep: its number, the values of the swept keys, and its job, with an output directory of its own.
 
     A job without a sweep is one case without settings, with the output directory of the job.
     """
@@ -362,7 +363,8 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
     grid, such as `points: auto`, by numbers (see `mesh.load`); without it these words are mistakes. Raises JobError
     with all mistakes.
 
-    For a job with a sweep `case` selects the case; raises InputError if there is none, or if none is selected.
+    For a job with a sweep `case` is the number of a case. Raises InputError if the sweep has no case of this number,
+    and JobError if no number is given.
     """
     if case is not None:
         return select_cases(load_cases(given, overrides, fill_grid=fill_grid), case)[0].job
@@ -393,7 +395,8 @@ def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid | N
 
 
 def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
-    """Return all cases, or only the case with a number; raises InputError if there is none."""
+    """Return all cases if `number` is None, else only the case with this number; raises InputError if it does not
+    exist."""
     if number is None:
         return cases
     if not cases[0].settings:
@@ -503,7 +506,8 @@ FILES = ("file", "topography")  # shapes that come from files
 
 
 def shown_job(path: Path) -> Job:
-    """Return the stored job of an output directory, with flat shapes in place of files, which may no longer exist."""
+    """Return the stored job of an output directory, with flat shapes in place of files of heights and spectra, which
+    may no longer exist."""
     try:
         text = path.read_bytes()
         data = yaml_text.parse(text, str(path)).data

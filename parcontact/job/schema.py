@@ -50,7 +50,7 @@ class SchemaOfKeys(GenerateJsonSchema):
     """Pydantic's generator of schemas, extended by the short forms of values."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
-        """Return False: keys have no titles."""
+        """Return False: pydantic would otherwise add a title, the key itself, to each key."""
         return False
 
     def function_before_schema(self, schema: Any) -> Schema:
@@ -65,7 +65,8 @@ class SchemaOfKeys(GenerateJsonSchema):
         return {"anyOf": [one_value, array, *ranges]}
 
     def function_after_schema(self, schema: Any) -> Schema:
-        """Return the schema of a number with its range; open ends become the limits of all numbers."""
+        """Return the schema of a number with its range. A range without a lower or an upper end gets the limits that
+        hold for every number in a job."""
         found, most = super().function_after_schema(schema), LIMITS.get(schema["function"]["function"])
         if most is None:
             return found
@@ -74,7 +75,7 @@ class SchemaOfKeys(GenerateJsonSchema):
 
 
 def without_schema() -> dict[str, str]:
-    """Return the reasons why sections of effects have no schema, by section."""
+    """Return, for each section of an effect that has no schema, the reason."""
     reasons = {}
     for name, effect in listing.find_effects().items():
         try:
@@ -120,7 +121,7 @@ def _included(definitions: Schema) -> Schema:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a section: a description of its values, its unit, range and default ('' if none)."""
+    """A key of a section: a description of its values, and their unit, range and default, each '' if there is none."""
 
     word: str
     must_be: str

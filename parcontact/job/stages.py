@@ -75,7 +75,8 @@ class Oscillation:
         return self.mean + self.amplitude
 
     def at(self, fraction: float, seconds: float) -> float:
-        """Return the load `seconds` after the start of the stage; exact at both turns."""
+        """Return the load `seconds` after the start of the stage; it is exact at the highest and at the lowest load.
+        The `fraction` of the stage has no effect."""
         phase = math.remainder(seconds * self.frequency, 1.0)
         return self.mean + self.amplitude * math.sin(2.0 * math.pi * phase)
 
@@ -101,14 +102,13 @@ class Swing(tuple[float, float]):
         return hash((*self, self.frequency))
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] that the surface would need at the constant velocity `amplitude` to reach its position
-        after `seconds`."""
+        """Return the time [s] which, times the amplitude of the velocity, gives the displacement after `seconds`."""
         turn = 2.0 * math.pi
         return math.sin(turn * math.remainder(seconds * self.frequency, 1.0)) / (turn * self.frequency)
 
 
 class SwingKeys(Part):
-    """The keys of a velocity that oscillates."""
+    """The keys of a velocity that oscillates, as they are written in a job."""
 
     amplitude: Vector = Field(description="an amplitude [m/s]: a number along x, or [vx, vy]")
     frequency: Positive = Field(description="a positive frequency [Hz]")
@@ -167,9 +167,9 @@ Creep = Annotated[tuple[AnyCreep, AnyCreep], BeforeValidator(along_x), Field(des
 
 @dataclass(frozen=True)
 class Ramp:
-    """A load that changes linearly from `start` to `end` within a stage.
+    """A load [Pa, N or m] that changes linearly from `start` to `end` within a stage.
 
-    The normal `velocity` [m/s] of an approach, if given, determines the duration of the stage.
+    An approach may have a normal `velocity` [m/s], which then determines the duration of the stage.
     """
 
     start: float
@@ -292,7 +292,8 @@ WHICH_LOAD = "give a pressure [Pa], a force [N] or an approach [m]"
 
 
 class Stage(Part):
-    """One stage of the history: a load, a velocity, and a duration; a stage without duration is one solve."""
+    """One stage of the history: a load, a velocity, and a duration. A stage without duration is one step, in which
+    nothing slides and no time passes."""
 
     name: str = Field(default="stage", description="text (put numbers in quotes)")
     pressure: Annotated[Load | None, _load(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
@@ -321,7 +322,7 @@ class Stage(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Return `data` with `time_step: auto` for a stage with a duration that gives no steps."""
+        """Return the keys `data` of a stage, with `time_step: auto` if the stage lasts and its steps are not given."""
         approach, given = data.get("approach"), data.keys() & {"time_step", "cells_per_step"}
         moves = approach.get("velocity") if isinstance(approach, dict) else getattr(approach, "velocity", None)
         lasts = moves or data.keys() & {*LASTS}
@@ -341,7 +342,7 @@ class Stage(Part):
 
     @property
     def rolls(self) -> bool:
-        """Return True if the points of the surface move at another velocity than its shape, as in rolling."""
+        """Return True if the shape rolls: its points then move at another velocity than the shape as a whole."""
         return self.creep != SLIDES
 
     @property
@@ -377,8 +378,8 @@ class Stage(Part):
         return math.hypot(*self.velocity)
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] that the surface would need at its constant `velocity` to reach its position after
-        `seconds` of the stage."""
+        """Return the time [s] which, times `velocity`, gives the displacement `seconds` after the start of the stage:
+        these seconds, unless the velocity oscillates."""
         return self.velocity.moving(seconds) if isinstance(self.velocity, Swing) else seconds
 
     @property
@@ -399,7 +400,8 @@ def _steady_start(state: str, velocity: tuple[float, float], pressure: float | N
 
 
 class Initial(Part):
-    """The state of the body at time 0: undeformed, or in steady sliding (at rest: fully relaxed) under a pressure."""
+    """The state of the body at time 0: undeformed, or in steady sliding under a pressure. With a velocity of zero a
+    steady state is a contact that is fully relaxed."""
 
     state: Literal["virgin", "steady"] = "virgin"
     velocity: Velocity = (0.0, 0.0)
@@ -427,7 +429,7 @@ def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
 
 
 class Steady(Part):
-    """Steady sliding, solved directly for each speed, pressure and temperature."""
+    """Steady sliding, which is solved directly for all combinations of the speeds, pressures and temperatures."""
 
     velocities: SomeNumbers = Field(description="positive speeds [m/s]: a list, or first:last:count")
     pressures: SomeNumbers | None = Field(

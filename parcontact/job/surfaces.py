@@ -26,9 +26,10 @@ EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny,
 
 
 class GivenHeights:
-    """A read-only map of heights [m], shape (ny, nx), from Python. Only root has `values`: jobs are sent without them.
+    """A read-only map of heights [m], shape (ny, nx), from Python. Only root has `values`: a job that is sent to other
+    ranks loses them.
 
-    `cell` is the spacing [m] of points along x and y, NaN without coordinates.
+    `cell` is the spacing [m] of the points along x and y, by the coordinates of an xarray; NaN for an array without.
     """
 
     def __init__(self, given: Any) -> None:
@@ -108,14 +109,14 @@ class HeightArray(Part):
     )
 
     def stored(self) -> dict[str, Any]:
-        """Return the `shape: file` of a stored job, as plain data."""
+        """Return the shape by which a stored job names these heights, `shape: file`, as plain data."""
         return {"shape": "file", "path": self.heights.name, "scale": 1.0, "dataset": "heights"}
 
 
 def with_shapes(surface: Any) -> Any:
     """Return the `surface` of a job as a list of shapes; arrays become shapes.
 
-    Nested lists of numbers become one array, which is refused as a whole.
+    Nested lists of numbers become one array, so that there is one message for all of them.
     """
     shapes = surface if isinstance(surface, list) else [surface]
     if len(shapes) > 1 and all(isinstance(shape, list | int | float) for shape in shapes):
@@ -153,10 +154,12 @@ class Anisotropy(Part):
 
 
 class Rough(Part):
-    """Self-affine roughness with a roll-off, Eqs. (12)-(13) of the paper; scaled by one of rms slope, rms height or C.
+    """Self-affine roughness with a roll-off, Eqs. (12)-(13) of the paper. Its amplitude is given by the rms slope, the
+    rms height, or the constant C of the spectrum.
 
     The power spectrum is constant between the long and the roll-off wavelength, falls as q^(-2(1 + hurst)) down to the
-    short wavelength, and is zero elsewhere. `amplitudes: fixed` puts all randomness into the phases.
+    short wavelength, and is zero elsewhere. With `amplitudes: fixed` waves have the
+    amplitudes of the spectrum, and only their phases are random.
     """
 
     shape: Literal["rough"] = "rough"
@@ -201,7 +204,8 @@ class RoughSpectrum(Part):
 
 
 class Sphere(Part):
-    """A sphere; `profile: paraboloid` takes the parabola at its tip, as in Hertz's theory."""
+    """A sphere. With `profile: paraboloid` it has the shape of the parabola that touches its tip, as in Hertz's
+    theory."""
 
     shape: Literal["sphere"] = "sphere"
     radius: Radius
@@ -236,7 +240,8 @@ class Pyramid(Part):
 
 
 class Punch(Part):
-    """A round punch with a flat face of `radius`; around the face the surface falls as a parabola of radius `edge`."""
+    """A round punch with a flat face of `radius`. Outside of the face its surface falls as a parabola whose radius of
+    curvature is `edge`."""
 
     shape: Literal["punch"] = "punch"
     radius: Radius
@@ -316,7 +321,8 @@ class Topography(Part):
         return self.units.z if self.units else self.unit
 
     def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
-        """Return the size [m] that the job gives for a map with `points` along x and y; None if it gives none."""
+        """Return the size [m] along x and y that the job gives for a map: the key `size`, or `pixel` times the numbers
+        of `points` of the map; None without both."""
         return (self.pixel[0] * points[0], self.pixel[1] * points[1]) if self.pixel else self.size
 
 

@@ -1,4 +1,4 @@
-"""Text of a job as plain data with the place of each value and key, for messages about mistakes.
+"""The text of a job as plain data with the place of each value and key, for messages about mistakes.
 
 Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
 The size of a text and the number of its values after expansion of aliases are limited.
@@ -28,7 +28,7 @@ Key = tuple[str | int, ...]  # the way to a value: ("history", 0, "pressure")
 
 
 class Place(NamedTuple):
-    """A place in a file; `line` is 0 if `origin` alone is the place, such as a command-line override."""
+    """A place in a file. Other origins of a value, such as an override on the command line, have the `line` 0."""
 
     origin: str
     line: int = 0
@@ -39,7 +39,7 @@ class Place(NamedTuple):
 
 
 class Mistake(NamedTuple):
-    """A place and a sentence about the mistake there."""
+    """A mistake as users see it: a place, and a sentence (see `Fault` for a mistake before its place is known)."""
 
     place: Place
     sentence: str
@@ -59,9 +59,8 @@ NOWHERE: Final = Place("")
 
 
 class Located(NamedTuple):
-    """The result of following a path: the path as the user wrote it, and the places of its value and of its key.
-
-    The places of a missing value are the place of the mapping that lacks it.
+    """The place of a key of a job: the `path` of keys to it as the user wrote it, and the places of its value and of
+    the key itself. If the key is missing, both are the place of the mapping that lacks it.
     """
 
     path: Key
@@ -89,7 +88,7 @@ class Source:
         self.mistakes.append(Mistake(place, sentence))
 
     def put(self, path: Key, value: Any, key_place: Place, place: Place) -> None:
-        """Set a value in an existing mapping or list, with the places of its key and of the value."""
+        """Set the value at a path, whose last key may be new, with the places of this key and of the value."""
         node = self.data
         for step in path[:-1]:
             node = node[step]
@@ -98,7 +97,7 @@ class Source:
         self.places[path] = key_place, place
 
     def locate(self, path: Key) -> Located:
-        """Return the places on a path through the data; indices into a list given as a single value are ignored."""
+        """Return the place of a key. An index is ignored where the job gives a single value in place of a list."""
         node, place, key_place, steps = self.data, self.place, self.place, Key()
         for step in path:
             if isinstance(node, dict | list) and (step in node if isinstance(node, dict) else step in range(len(node))):
@@ -124,7 +123,7 @@ AT_VALUE, AT_KEY = "at value", "at key"  # types of this module's errors in pyda
 
 
 class Fault(NamedTuple):
-    """A mistake in a job: the predicate of a sentence about a key, and the path to this key."""
+    """A mistake that a check finds: the predicate of a sentence about a key, and the path to this key."""
 
     predicate: str
     path: Key = ()
@@ -158,7 +157,7 @@ def is_storable(text: str) -> bool:
 
 
 def quote(value: Any) -> str:
-    """Return a value as text, as it is shown after "got"."""
+    """Return a value as text, for the part of a message after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
     text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
@@ -180,8 +179,8 @@ def closest(word: Any, words: Iterable[str]) -> str:
 
 
 def in_si(value: Any, unit: str) -> str:
-    """Return the ending '; write 1.0e-3' if a value is a number in a multiple of its `unit`, such as '1 mm', else
-    ''."""
+    """Return the ending '; write 1.0e-3' of a message if a value is a number with a multiple of the `unit` of its key,
+    such as '1 mm', else ''."""
     text = value.strip() if isinstance(value, str) and unit in HAVE_PREFIXES else ""
     found = re.fullmatch(rf"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*({'|'.join(PREFIXES)}){unit}", text)
     if not found:
@@ -224,13 +223,13 @@ def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
 
 
 class JobLoader(yaml.SafeLoader):
-    """PyYAML's safe loader with the rules RESOLVERS for plain words."""
+    """PyYAML's safe loader, with the rules RESOLVERS on which words without quotes are numbers, true or nothing."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
 
 class JobDumper(yaml.SafeDumper):
-    """PyYAML's safe dumper with the rules RESOLVERS: it quotes texts that `JobLoader` would not read as text."""
+    """PyYAML's safe dumper, which quotes texts that `JobLoader` would not read as text."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
@@ -268,8 +267,8 @@ REMEDIES = {  # by a part of a frequent message of PyYAML
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
-    """Return YAML text as a `Source`. Messages name the place of a value by `origin`, line and column; if `whole` is
-    given, all values have this place."""
+    """Return YAML text as a `Source`. Messages name the place of a value by `origin`, such as a file, line and column.
+    All values of an override have the place `whole`."""
     start = whole or Place(origin, 1, 1)
     source = Source(UNREADABLE, start)
     reader = _Reader(source, origin, whole)
@@ -359,7 +358,7 @@ class _Reader:
 
 
 def source_of(data: Any, place: Place = NOWHERE) -> Source:
-    """Return Python data as a `Source` with one place."""
+    """Return Python data as a `Source`; all its values have the same place."""
     source = Source(place=place)
     try:
         source.data = _plain(data, (), source)
