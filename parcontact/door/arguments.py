@@ -21,7 +21,11 @@ INFINITE = float("inf")
 
 
 def checked(convert: Callable[[str], T], accepts: Callable[[T], bool], expected: str) -> Callable[[str], T]:
-    """Return a function that converts a text, and raises ArgumentTypeError unless `accepts` the value."""
+    """Return a function that converts a text to a value.
+
+    It raises ArgumentTypeError if `convert` fails with ValueError, or if `accepts` returns False for the value; the
+    message has the words `expected`.
+    """
 
     def value_of(text: str) -> T:
         try:
@@ -66,7 +70,8 @@ degrees = checked(_floats, bool, "a list of temperatures [deg C]")
 
 
 def instant(text: str) -> str:
-    """Return the text if it is a step (digits) or a time [s]."""
+    """Return a text that gives a step (digits) or a time [s], without spaces around it. Raises ArgumentTypeError for
+    another text."""
     checked(float, lambda value: 0.0 <= value < INFINITE, "a step, as a whole number, or a time [s]")(text)
     return text.strip()
 
@@ -322,7 +327,8 @@ NAMES = tuple(verb.__name__ for verb in VERBS)
 
 
 def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
-    """Return the options of a command line; `act` is its verb. Raises InputError or SystemExit for mistakes."""
+    """Return the options of a command line; `options.act` is the function of its verb. Raises InputError or SystemExit
+    for mistakes."""
     if not words:
         raise InputError(FIRST)
     first, *rest = words
@@ -336,7 +342,7 @@ def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
 
 
 def without_restart(words: Sequence[str]) -> list[str]:
-    """Return the command line that continues the run of the command line `words`, as words."""
+    """Return the words of the command line that continues the run which the command line `words` started."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--restart")
     return parser.parse_known_args(words)[1]

@@ -1,9 +1,7 @@
 """`parcontact doctor`: checks of an installation.
 
-* Checks of the machine: ranks, libraries, speed, and files that a run writes and reads.
-* A bench runs small jobs and compares their results with exact values.
-* Checks of an installation against exact solutions, and the table of results.
-* Small jobs for checks, as mappings.
+The doctor describes the machine: its ranks, libraries and speed, and the files that a run writes and reads. It runs
+small jobs and compares their results with exact solutions. A `Bench` runs these jobs and keeps the comparisons.
 """
 
 import math
@@ -46,7 +44,7 @@ Watch = Callable[[March], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """A result of a check, the exact value, and the allowed absolute error."""
+    """A number that a check found, its exact value, and the largest absolute error that is allowed."""
 
     what: str
     found: float
@@ -72,7 +70,10 @@ class Finding:
 
 
 class Bench:
-    """Runs jobs on the ranks of `comm` in one precision, and keeps the worst finding of each name."""
+    """Runs small jobs on the ranks of `comm` in one precision, and compares results with exact values.
+
+    Of findings with the same `what` it keeps the one with the largest error in proportion to the allowed error.
+    """
 
     def __init__(self, comm: "MPI.Intracomm", precision: str = "double") -> None:
         self.comm, self.precision = comm, precision
@@ -92,7 +93,8 @@ class Bench:
     # -- running -------------------------------------------------------------------------------------------------------
 
     def begin(self, data: Json) -> March:
-        """Return a march at the start of a job, by default with a tolerance of 1e-10 and all branches; collective."""
+        """Return a march at the start of a job; collective. Unless the job says otherwise, its tolerance is 1e-10, and
+        all branches of the material are kept as maps."""
         numerics = {"tolerance": 1e-10, "branch_error": 0.0, **data.get("numerics", {}), "precision": self.precision}
         job = Job.model_validate({**data, "numerics": numerics})
         march = steady.first(job, Slab(self.comm, *job.grid.points))
@@ -115,7 +117,7 @@ class Bench:
         return np.concatenate(march.scene.slab.from_all(march.field(name)))
 
     def amplitude(self, march: March) -> float:
-        """Return the amplitude of the pressure of a wave that is longer than two cells [Pa]; collective."""
+        """Return the amplitude [Pa] of a pressure that is a single wave, longer than two cells; collective."""
         return float(np.sqrt(2.0) * np.std(self.whole(march, "pressure")))
 
     def _note(self, row: StepRow) -> None:
@@ -226,8 +228,8 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
 def prepare_loops(comm: "MPI.Intracomm") -> str:
     """Run small jobs to compile loops which the checks do not use; return a line of text. Collective.
 
-    The jobs slide steadily, slide in mixed precision, and adhere in periodic and free boxes. Effects compile their own
-    loops.
+    The jobs slide steadily, slide in mixed precision, and adhere in periodic and free boxes. Then the function
+    `compile_loops` of each effect is called.
     """
     began = time.perf_counter()
     touch = {"pressure": 3e4, "duration": 1e-3, "time_step": 5e-4}
@@ -254,7 +256,8 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
 
 
 def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
-    """Run a small job in two parts in a directory and compare its fields; return a message or ''. Collective."""
+    """Run a small job in two parts in a directory, and compare the pressures in its file with those of a run in memory;
+    return a message if they differ, else ''. Collective."""
     place = Path(comm.bcast(tempfile.mkdtemp(prefix="doctor-", dir=where) if comm.rank == 0 else None))
     try:
         stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-3 / STEPS}
@@ -309,7 +312,7 @@ class Check:
 
 
 def run_check(check: Check, bench: Bench) -> Bench:
-    """Run a check on a bench, and return the bench; collective. A failed solve is recorded as its failure."""
+    """Run a check on a bench, and return the bench; collective. The error of a failed solve becomes `bench.failure`."""
     try:
         check.run(bench)
     except RunError as error:

@@ -37,7 +37,8 @@ DIRECTIVE = re.compile(r"^\.\. auto(?:class|function):: (\S+)\n(?:   :members:(.
 
 
 def written(page: str) -> str:
-    """Return a page on Python in which headings and docstrings replace its blocks of directives."""
+    """Return the Markdown of a page in which headings and docstrings replace the directives of Sphinx (see the
+    module)."""
     return BLOCK.sub(lambda block: "\n\n".join(_entries(block.group(1))), page)
 
 
@@ -88,7 +89,7 @@ MEANINGS = Path(__file__).parent / "manual" / "keys.yaml"
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """Return `[meaning, example]` for each key of a job, by the names of the part and of the key."""
+    """Return `[meaning, example]` of each key of a job: a mapping from the name of a section's class to its keys."""
     found: dict[str, dict[str, Any]] = yaml.safe_load(MEANINGS.read_text(encoding="utf-8"))
     return found
 
@@ -99,7 +100,8 @@ def keys() -> str:
 
 
 def heading(section: SectionSchema) -> str:
-    """Return the name of a section: its place in a job, and its kind if there are several kinds."""
+    """Return the heading of a section: its place in a job, and its kind (such as `shape: sphere`) if the job has a
+    choice of kinds there."""
     kind = kind_key(section.part)
     named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
     more = section.part.label.removeprefix(named.replace(":", "")).strip()

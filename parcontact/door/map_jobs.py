@@ -1,4 +1,5 @@
-"""Jobs made from a measured map: one to describe it, and one for the user to start from."""
+"""Jobs that the program makes from a measured map: one with which it describes the map, and one that a user can
+change and run."""
 
 import math
 import os
@@ -46,8 +47,11 @@ def refuse_taken(target: Path | None) -> None:
 
 
 def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
-    """Write a job for the user to start from to `target`, or yield its text, with at most MANY_POINTS points. Raises
-    InputError."""
+    """Make a job from a measured map that a user can change and run; yield lines of text about it.
+
+    The job has at most MANY_POINTS points. It is written to the file `target`; without `target` its text is yielded.
+    Raises InputError if the file cannot be written.
+    """
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
     found["surface"] |= {key: value for key, value in plain_data(job.surface[0]).items() if key != "path"}

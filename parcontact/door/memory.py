@@ -1,15 +1,15 @@
 """Memory of a job's run and costs of its steps, for a plan.
 
-The memory of a rank in maps, and the size of a checkpoint [bytes], follow exactly from the job.
+The memory of a rank in maps, and the size of a checkpoint [bytes], are exact.
 
 The constructors of a run are called on a slab that counts memory without allocating it (`parallel.slab.Slab.planned`).
 
 In a trial of a job some steps are made in memory, and all others are assumed to cost the same.
 
 Each stage has an equal share of the time. When the share is used up, one long step leads to the end of the stage. The
-first steps of a stage, where the load may jump, do not count for later ones. If a job is too large to reach its steps
-in half of the time, its steps are counted and timed on a quarter of the points along each side, and transforms on its
-own grid are timed until then.
+load may jump at the start of a stage: the cost of later steps is that of the tried steps without the first ones. If
+half of the time is over before a job has made enough steps, its steps are counted and timed on a quarter of the points
+along each side. The transforms that the job made on its own grid before then give the ratio of times of both grids.
 
 Times are processor times without those in which a rank waits for others: MPI waits in a busy loop, for as long as other
 programs use the processor of the other rank.
@@ -68,8 +68,8 @@ NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energi
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
     """Return the memory of a rank in maps and transform buffers [bytes], by purpose.
 
-    The default is the last rank, which has the most memory; for the spectrum of the surface, the largest memory of all
-    ranks is returned.
+    The default is the last rank, whose maps are the largest. Its entry for the spectrum of the surface is the largest
+    of all ranks.
     """
     slab = _slab(job, ranks, rank)
     scene = build_on(outline(job, slab))
@@ -88,8 +88,9 @@ def total_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def steady_start(job: Job, ranks: int = 1, rank: int | None = None) -> int:
-    """Return the largest memory of a rank in maps [bytes] during the initial steady state, before `holdings` exist; 0
-    for a run without it. The table of the wake of a free box may briefly take more."""
+    """Return the largest memory of a rank in maps [bytes] while the initial steady state is solved, before a run
+    allocates the maps of `holdings`; 0 for a run without a steady start. In a free box, the response of the body behind
+    the contact may need more memory for a short time."""
     if not choices(job).steady_start.on:
         return 0
     return steady_bytes(job, ranks, rank)
@@ -108,8 +109,8 @@ def steady_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def most_bytes(job: Job, ranks: int) -> int:
-    """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and with saved
-    fields, or in the steady state from which a run starts."""
+    """Return the largest memory of rank 0 in maps [bytes]: the larger of the memory of steps, with saved fields and
+    with the coarser grids of a first solve, and of the memory of a steady start."""
     (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
     if not job.history:
         return steady_bytes(job, ranks)
@@ -118,8 +119,8 @@ def most_bytes(job: Job, ranks: int) -> int:
 
 
 def on_tiles(job: Job) -> int:
-    """Return the largest additional memory of rank 0 [bytes] while a dilute first contact is solved on tiles; 0 for a
-    run without tiles."""
+    """Return the additional memory of rank 0 [bytes] if the first contact covers so little of the grid that it is
+    solved on small squares of the grid (tiles); 0 for a run that uses no tiles."""
     chosen, (nx, ny) = choices(job), job.grid.points
     cold = bool(job.history) and not chosen.steady_start.on and not chosen.forbidden(EXTRAPOLATION)
     large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
@@ -138,8 +139,8 @@ def on_tiles(job: Job) -> int:
 
 
 def saved(job: Job) -> int:
-    """Return the size of the maps in a checkpoint [bytes], with a checksum of 4 bytes per row. Effects declare their
-    maps themselves, as some exist only in checkpoints."""
+    """Return the size of the maps in a checkpoint [bytes]; each row of a map has a checksum of 4 bytes. Effects declare
+    their maps themselves, as some exist only in checkpoints."""
     (nx, ny), scene = job.grid.points, build_on(outline(job, _slab(job, 1, 0)))
     memories = _completed(scene)
     parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
@@ -185,7 +186,8 @@ def free_bytes() -> int:
 
 
 def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
-    """Return the number of cases to run at the same time: one per rank if small and within memory, else 1."""
+    """Return the number of cases to run at the same time: a case for each rank if the grids have at most MOST_POINTS
+    points and all cases fit into the memory, else 1."""
     at_once = min(ranks, len(jobs))
     if at_once < 2:
         return 1
@@ -204,7 +206,7 @@ COARSER, LEAST = 4, 32  # ratio of the points along a side in successive trials,
 
 
 class OutOfTimeError(Exception):
-    """The time of a trial has been used up."""
+    """Raised on all ranks when the time of a trial is used up."""
 
 
 class WaitingRanks(MPI.Intracomm):
@@ -238,8 +240,8 @@ def worked(slab: Slab) -> float:
 
 
 class TimedSlab(Slab):
-    """A slab whose sums over ranks raise OutOfTimeError once, on all ranks, after one of them has reached the instant
-    `end` of its `process_time`.
+    """A slab that ends a trial: when the `process_time` of a rank has passed `end`, the next sum over ranks raises
+    OutOfTimeError on all ranks, once.
 
     `begun` holds the processor time and the counts before the first solve.
     """
@@ -275,7 +277,8 @@ def _work(nx: int, ny: int) -> float:
 
 @dataclass
 class StageCost:
-    """Cost of a stage: numbers of steps and of tried steps, and sums over the FIRST tried steps and over later ones."""
+    """Cost of a stage: its number of steps, how many of them were tried, and the sums of each cost over the `first` few
+    tried steps and over `later` tried steps."""
 
     steps: int
     tried: int = 0
@@ -300,8 +303,9 @@ class StageCost:
 class Trial:
     """Costs of a `job`, measured in a trial on `ranks` ranks, for each stage, or for all steady states as one stage.
 
-    `points` are the points of the grid that was tried, `building` is the time in which its scene was set up [s], and
-    `price` the time of its transforms divided by N log N; in the end the ratio to this time on the job's grid.
+    `points` are the points of the grid that was tried, and `building` is the time in which its scene was set up [s].
+    `price` is the time of a transform of N points divided by N log N, on the grid of the job over the tried grid; 1 if
+    they are the same.
     """
 
     job: Job
@@ -320,13 +324,15 @@ class Trial:
         return sum(stage.tried for stage in self.stages)
 
     def total(self, name: str) -> float:
-        """Return the sum of `seconds`, or of a count in the tally, over all steps; untried stages cost the mean."""
+        """Return the cost `name` of all steps: `seconds`, or the name of a count in the tally. A step of an untried
+        stage has the mean cost of the others."""
         tried = [stage for stage in self.stages if stage.tried]
         steps = sum(stage.steps for stage in tried)
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
 
     def share(self, ranks: int) -> float:
-        """Return the work of a rank, if `ranks` share the grid of the job, divided by its work in the trial."""
+        """Return the ratio of the work of a rank, when `ranks` ranks share the grid of the job, to the work of a rank
+        in the trial."""
         return self.price * _work(*self.job.grid.points) / _work(*self.points) * self.ranks / ranks
 
     def step(self, ranks: int, overhead: float) -> float:
@@ -401,8 +407,8 @@ def _coarser(job: Job) -> Iterator[Job]:
 
 
 def warm_up(job: Job, slab: Slab) -> float:
-    """Make the first steps, or steady states, of a tiny scene, so that later steps include no compilation. Return the
-    time [s] of an operator call in this scene; collective."""
+    """Make the first steps, or steady states, of a scene of few points, so that later steps include no compilation.
+    Return the time of one of its operator calls [s]; collective."""
     small = _tiny(job)
     if small is None:
         return 0.0

@@ -1,6 +1,6 @@
 """`parcontact plan`: what a job will do, and what it will cost, as text.
 
-A plan has the effects of a job, the memory of a rank, and steps and times by a trial.
+A plan lists the effects of a job and the memory of a rank. A trial gives the numbers of steps and their times.
 
 The first case of a sweep is planned in full. The last case and one in between are tried. The times of other cases
 follow from the nearest tried case in proportion to the work, which is steps (or steady states) times N log N.
@@ -139,8 +139,8 @@ KILO = 1024  # unit of resident memory in `getrusage` [bytes]
 
 @dataclass
 class Planner:
-    """Plans jobs for the numbers of `ranks`, within about `seconds` [s] of processor time since the program began; half
-    of it may be used up before a trial. `started` [s] is the time that the program took to start.
+    """Plans jobs for each number of ranks in `ranks`, within about `seconds` [s] of processor time since the program
+    began, of which a trial gets at least half. `started` [s] is the time that the program took to start.
 
     Trials are appended to `found`, and `overhead` is the time of an operator call on a few points [s].
     """
@@ -152,7 +152,8 @@ class Planner:
     overhead: float = 0.0
 
     def plan(self, job: Job, slab: Slab, trials: int = 1) -> Iterator[str]:
-        """Yield the plan of a job, one of several trials, as lines; collective: all ranks must exhaust the iterator."""
+        """Yield the lines of the plan of a job; collective: all ranks must exhaust the iterator. The time of the
+        planner is for a number of `trials`, of which this is the first."""
         yield from effects(job)
         parts = [job] * bool(job.history) + [only_steady_states(job)] * (job.steady is not None)
         for part in parts:
@@ -163,7 +164,8 @@ class Planner:
             yield from self._describe(part, slab, trials * len(parts))
 
     def plan_sweep(self, cases: Sequence[Case], groups: Groups) -> Iterator[str]:
-        """Yield the plan of all cases, of which each group of ranks runs one at a time; collective like `plan`."""
+        """Yield the lines of the plan of all cases of a sweep; collective like `plan`. Each group of ranks runs one
+        case at a time."""
         first, slab, tries = cases[0], Slab(groups.comm, *cases[0].job.grid.points), cases_to_try(len(cases))
         yield f"first of {len(cases)} cases: {', '.join(f'{key} = {value}' for key, value in first.settings.items())}"
         yield ""
@@ -232,10 +234,8 @@ def _work(job: Job) -> float:
 
 
 def measure_program(slab: Slab) -> int:
-    """Return the largest memory of a rank so far [bytes]: libraries and loops, if no large maps were made.
-
-    Collective.
-    """
+    """Return the largest memory of a rank so far [bytes]; collective. Before large maps are made, this is the memory of
+    libraries and compiled loops."""
     from ..files import run  # noqa: F401  # a run imports it
 
     return int(slab.reduce((), [float(peak_memory())])[0])

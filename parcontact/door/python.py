@@ -88,7 +88,8 @@ PACKAGE = str(Path(__file__).parents[1]) + os.sep
 def read_job_here(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
     """Return the job of a file or mapping with changed keys, on every rank of `comm`; collective.
 
-    Raises JobError, also if ranks give different jobs, and InputError for a run that cannot begin.
+    Raises JobError for mistakes in the job, or if ranks give different jobs, and InputError for a run that cannot
+    begin.
     """
     world = all_ranks(comm)
     agree(world, given, changes)
@@ -165,7 +166,8 @@ def path_of(path: object) -> Path:
 
 
 def of_parts(**parts: Any) -> Job:
-    """Return a job from some sections, made on this rank only. Raises JobError."""
+    """Return a job that has the given sections and defaults for the others; it is made on this rank only. Raises
+    JobError for mistakes."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
     return _sound(mesh.load(rest | parts))
 
@@ -235,11 +237,13 @@ def steady(
     """Solve steady sliding at velocities [m/s] under mean pressures [Pa], and return the curve on every rank;
     collective.
 
-    `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
-    spaced in the logarithm (default: the job's `steady` section, and the pressure of its first loaded stage);
-    `temperatures` [deg C] as a list, for a material with a shift (default: the `steady` section). Raises JobError, and
-    InputError for missing velocities or pressures; warns (ParcontactWarning, on root) about failed points and
-    implausible values. Nothing is written.
+    `job` and `set` are those of `Simulation`. Velocities and pressures are lists, or texts `first:last:count` for
+    numbers equally spaced in the logarithm. Without them those of the job's `steady` section are taken, and for
+    pressures else the one of the first stage under a load. `temperatures` [deg C] is a list, for a material with a
+    shift (default: the `steady` section). Nothing is written.
+
+    Raises JobError, and InputError for missing velocities or pressures. Failed points and implausible values give a
+    ParcontactWarning on root.
     """
     asked = {
         "velocities": _numbers("velocities", velocities),
@@ -306,11 +310,11 @@ def _numbers(name: str, values: Values, ranges: bool = True) -> tuple[float, ...
 def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     """Return the results of a run, which may still be running, as an xarray dataset.
 
-    The columns of measures.csv along `step`, with the coordinate `time` [s]; maps of fields.h5 as `pressure_map`,
-    `gap_map`, ..., of shape (t, y, x), read when used, with the coordinates `t` [s] and `map_step`:
-    `friction.sel(step=map_step)` is the friction of each map. Variables have `units`, `1` if dimensionless; columns of
-    other packages' effects have none. Values that were not requested are NaN. Raises InputError for a directory without
-    results, ImportError without xarray.
+    The columns of measures.csv are variables along `step`, with the coordinate `time` [s]. Maps of fields.h5 are the
+    variables `pressure_map`, `gap_map`, ..., of shape (t, y, x), with the coordinates `t` [s] and `map_step`; they are
+    read when they are used. `friction.sel(step=map_step)` is the friction of each map. Variables have `units`, `1` if
+    dimensionless; columns of other packages' effects have none. Values that were not requested are NaN. Raises
+    InputError for a directory without results, ImportError without xarray.
     """
     run = Results(path_of(directory), "run")
     if "run" not in run.kinds:

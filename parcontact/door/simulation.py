@@ -38,8 +38,9 @@ class Row(Mapping[str, float]):
     """Measures of an instant: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
 
     Energies [J] that the job does not request (`output.energy`) are NaN. `dict(row)` has all columns. Type checkers
-    know the columns of the page `outputs` as attributes; columns of branches and of other effects are
-    `row["dissipated_0"]`. A column that the job does not have raises AttributeError.
+    know the columns of the page `outputs` as attributes. Columns of single branches, such as `row["dissipated_0"]`, and
+    those of effects of other packages have no attribute for them. A column that the job does not have raises
+    AttributeError.
     """
 
     step: int
@@ -137,7 +138,7 @@ class Simulation:
 
     Parameters: `job`, the path of a job file or a mapping with the same keys; `set`, values by keys like `grid.points`
     that replace values of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
-    mistakes, InputError for files that do not match it; warns (ParcontactWarning, on root) about implausible values.
+    mistakes, and InputError for files that do not match the job. Implausible values give a ParcontactWarning on root.
 
     Files are written by `run` only, and only if the job, or `set`, gives `output.directory`. Paths in a mapping are
     relative to the working directory.
@@ -211,7 +212,8 @@ class Simulation:
 
     @property
     def row(self) -> Row:
-        """Return the measures of the last step, also before a restart; before the first step, the initial state."""
+        """Return the measures of the last step, or of the initial state before the first step. After `restore` it is
+        the row of the last step before the checkpoint."""
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
@@ -231,14 +233,15 @@ class Simulation:
     @property
     def errors(self) -> dict[str, dict[str, float]]:
         """Return the known estimated relative errors so far, as printed at the end of a run: of `friction` and
-        `contact_area_corrected`, by source and in total (`total`). Rows have the errors of single instants."""
+        `contact_area_corrected`, by source and in total (`total`). The rows of `steps` have the errors of their
+        instants."""
         return {name: dict(parts) for name, parts in self._march.state.errors.facts(None).items() if name != "accuracy"}
 
     # -- fields -------------------------------------------------------------------------------------------------------
 
     @property
     def rows(self) -> slice:
-        """Return the slice of rows (along y) of a map on this rank."""
+        """Return the slice of a map's first axis (y) that is on this rank."""
         return self._slab.rows
 
     def field(self, name: str) -> Array:

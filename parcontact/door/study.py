@@ -1,7 +1,8 @@
 """`parcontact study`: errors and costs of settings, from a sweep over meshes, steps and integrators.
 
-All meshes, cells per step and integrators are combined. For each integrator the mesh is also refined with the time
-steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
+A study runs all combinations of its meshes, cells per step and integrators. For each integrator it also refines the
+mesh alone: all meshes then have the time steps of the finest mesh. A rough surface of one seed has the same waves on
+every mesh.
 
 Stages that choose their steps do so in every case, unless the study lists cells per step, which then hold in sliding
 stages.
@@ -12,8 +13,8 @@ For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio
 
 f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
 
-with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 for
-different ratios of sizes). The uncertainty is the larger of two changes of the limit: if the order changes by DOUBT,
+with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 if h3/h2
+differs from h2/h1). The uncertainty is the larger of two changes of the limit: if the order changes by DOUBT,
 and with four sizes, if the finest one is left out. It is at least LEAST_DOUBT of the last difference.
 
 Results of a study are limits, errors of all cases, the best settings, and sentences about them.
@@ -50,7 +51,8 @@ MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
 
 @dataclass(frozen=True)
 class Settings:
-    """A combination of settings: points along x, cells per step (of its mesh; None for chosen steps), integrator."""
+    """The settings of a case: points along x, integrator, and the number of cells of this mesh that the surface slides
+    in a step; None if stages choose their steps, or if no step is given."""
 
     mesh: int
     cells_per_step: float | None
@@ -58,7 +60,7 @@ class Settings:
 
     @property
     def time_step(self) -> float:
-        """Return the time step as a distance in lengths of the box; for chosen steps about one cell."""
+        """Return the distance slid in a step, in lengths of the box. Chosen steps count as one cell."""
         return (self.cells_per_step or 1.0) / self.mesh
 
     @property
@@ -71,7 +73,8 @@ class Settings:
 
     @property
     def directory(self) -> Path:
-        """Return the directory of the case in the study's directory. It does not change if ladders get longer."""
+        """Return the directory of the case in the study's directory. Its name follows from the settings, so that a
+        study with more values finds its earlier cases."""
         cells = AUTO if self.cells_per_step is None else f"{self.cells_per_step:.9g}"
         return Path(CASES, f"{self.mesh}-{cells}-{self.integrator}")
 
@@ -86,8 +89,9 @@ class Settings:
 class Ladders:
     """Lists of settings from coarse to fine; a single value for a setting that is not varied.
 
-    `shared` is the relative error that all cases may have in common: the accuracy of chosen steps, else 0. Friction is
-    assessed only if something `slides`.
+    `own` are the settings of the job itself. If the program chooses the steps of all cases, they may have an error in
+    common that no comparison shows: `shared` is the accuracy for which steps are chosen, else 0. Friction is assessed
+    only if `slides`, that is, if a stage slides.
     """
 
     meshes: tuple[int, ...]
@@ -139,7 +143,8 @@ def ladders(job: Job) -> Ladders:
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
-    """Return the overrides that change the job to a case; all time steps change in the same proportion."""
+    """Return the overrides that change the job with its `own` settings to a case. All given time steps change by the
+    ratio of the case's time step to that of `own`."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += [
@@ -226,8 +231,8 @@ class Limit:
 def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     """Return the limit for size 0 of at least two values at decreasing sizes.
 
-    If there are two values only, or values do not converge monotonically, the limit is the finest value, and its
-    uncertainty the larger of the last two differences (NaN if they are 0).
+    If there are two values only, or values do not converge monotonically, the limit is the finest value. Its
+    uncertainty is then the larger of the last two differences, or the only difference; NaN if they are 0.
     """
     last = abs(values[-1] - values[-2])
     order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
@@ -291,8 +296,10 @@ class StudyFinding:
 
 
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
-    """Return sizes and cases of each refinement from coarse to fine: mesh and time together, mesh alone, time alone;
-    for chosen steps only the mesh."""
+    """Return the sizes and the cases of each refinement from coarse to fine, by its name.
+
+    The refinements are mesh and time together, mesh alone, and time alone; if no steps are given, the mesh.
+    """
     usual = [case for case in outcomes if case.integrator == integrator]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
     together = sorted((c for c in usual if _is_same(c.cells_per_step, coarse)), key=lambda case: case.mesh)
@@ -332,8 +339,8 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
-    """Return the reference of each quantity: the limit along mesh and time together, the least uncertain one with an
-    order; along time alone if meshes are not varied.
+    """Return the reference of each quantity: a limit along mesh and time together, or along time alone if meshes are
+    not varied. Limits with an order come before others; among these the least uncertain one is taken.
 
     Without such a refinement, or without differences, the reference is the most expensive case, with unknown error.
     Errors that all cases have in common do not show in a limit, so that its uncertainty is at least `ladders.shared`.
@@ -360,7 +367,7 @@ def estimate_errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[st
 
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Return the errors; an error below the uncertainty of its reference is replaced by this uncertainty."""
+    """Return the errors that are proven: an error below the uncertainty of its reference counts as this uncertainty."""
     return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 
@@ -371,7 +378,8 @@ def worst(error: Mapping[str, float]) -> float:
 
 
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
-    """Return the settings that reach each target in the least time, and the error of the reference."""
+    """Return sentences: for each error in TARGETS the fastest settings whose errors are at most as large, and the error
+    of the reference."""
     error = {case: worst(proven(estimate_errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     if all(map(math.isnan, error.values())):
         return ["there is no contact, and no error"]

@@ -1,4 +1,5 @@
-"""Verbs of the command line, from options to exit code. Each imports its modules when it runs, to start quickly.
+"""Verbs of the command line, from options to exit code. A verb imports the modules that it needs when it runs, so that
+every verb starts quickly.
 
 A verb works on the job, or on the selected cases of its sweep. The launcher's environment variables state which rank is
 root, so that verbs without MPI start at once; other ranks then print nothing and exit with code 0.
@@ -96,8 +97,8 @@ def _refuse_surroundings() -> None:
 
 
 def root_alone(verb: Verb) -> Verb:
-    """Return a verb that only root executes. With several ranks MPI is started first, as imports on root may start
-    it."""
+    """Return a verb that only root executes. With several ranks MPI is started first on all of them, as an import on
+    root might start MPI there alone."""
 
     @wraps(verb)
     def act(options: argparse.Namespace) -> int:
@@ -118,7 +119,8 @@ OF_A_CURVE = ("velocities", "pressures", "temperatures")
 def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
     """Apply `act` to a job, to all cases of its sweep, or to the selected case; collective.
 
-    Cases that run at the same time print only their beginning and end.
+    With `runs` False `act` makes no run: cases get no warnings, and finished cases are done again. Cases that run at
+    the same time print only their beginning and end.
     """
     from ..files.stopping import always
     from ..parallel.slab import Slab
@@ -154,7 +156,7 @@ def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case
 
 
 def job_overrides(options: argparse.Namespace) -> list[str]:
-    """Return the changes of the job by the command line, as texts KEY=VALUE.
+    """Return the texts KEY=VALUE by which the command line changes the job.
 
     The name of a directory is escaped, so that YAML reads it as text. Velocities, pressures and temperatures of a
     friction curve become keys of the job.
@@ -360,7 +362,7 @@ def fit(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
-    """Run a job on finer and finer meshes and steps, and draw error over time; continues after a stop."""
+    """Run a job on finer and finer meshes and steps, and draw errors over computing time; continues after a stop."""
     world = start_ranks()
     from ..parallel.slab import Slab
     from . import study as door_study
