@@ -1,4 +1,5 @@
-"""Adhesion: surfaces that attract each other. This module has the columns that adhesion adds to tables."""
+"""Adhesion: surfaces that attract each other. This module states the columns of tables for jobs with
+adhesion."""
 
 from ...capabilities import Column, Table
 

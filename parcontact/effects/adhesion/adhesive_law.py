@@ -3,16 +3,16 @@
 Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
 last two gaps, extrapolated in time and moved with the surface by whole cells.
 
-`AdhesiveSolver` extends the solver, which needs the inverse of its operator, to a free body. The FFT does not invert
-the operator A of a free body. The operator B of a periodic body, with the same Green's function up to half the box,
-replaces it (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A - B)
-p` with the p of the pass before. One or two passes are usual.
+The solver of gaps (`gap_solver`) needs the inverse of its operator. `AdhesiveSolver` extends it to a free body, whose
+operator A the FFT does not invert. A is replaced by the operator B of a periodic body with the same Green's function up
+to half the box (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A -
+B) p` with the p of the pass before. One or two passes are usual.
 
 A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
 state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
 detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations (`FreeInverse`).
-Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the inverse of A on
-pressures of mean 0.
+Then the energy E of `gap_solver` falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K
+the inverse of A on pressures of mean 0.
 """
 
 from __future__ import annotations
@@ -219,7 +219,8 @@ LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area und
 
 
 class PastGap(NamedTuple):
-    """The gap after a step and the position of the surface [m]; `known` is False before the first step."""
+    """The map of the gap after a step, and the position of the surface [m]. `known` is False if the map has no gap yet,
+    as before the first step."""
 
     gap: Array
     position: tuple[float, float] = (0.0, 0.0)
@@ -228,8 +229,10 @@ class PastGap(NamedTuple):
 
 @dataclass(frozen=True)
 class AdhesiveMemory:
-    """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
+    """Memory of a contact with adhesion: maps of the gap.
 
+    `pasts` are the gaps after the last two steps, the newest first. `spare` receives the gap of the next step, and
+    `gap_backup` the gap at the last equilibrium within this step.
     `free_correction` is `(A - B) p` of the last solve for a free body, with the pressure `modulus p` (see the module);
     it is None for a periodic body. `end` has time and load of the detachment, and is None before it.
     """
@@ -248,7 +251,8 @@ class LoadPath:
     units for a body of modulus 1.
 
     The load is `before` at the last step, and `control` at the present one. `approach` and `pressure` are the approach
-    and the mean pressure of the last step. `closes_gap_first` is True for a compressive load on detached surfaces.
+    and the mean pressure of the last step. `closes_gap_first` is True for a compressive load on detached surfaces: they
+    are first moved together until they touch.
     """
 
     before: float
@@ -280,7 +284,7 @@ class _Walk(NamedTuple):
 
 
 class AdhesiveLaw:
-    """Contact law of the `adhesion` section, for the steps of a scene."""
+    """Contact law of a run whose job has the section `adhesion` (`effects.effect.ContactLaw`)."""
 
     may_shorten = True
 
@@ -314,7 +318,8 @@ class AdhesiveLaw:
         tolerance: float | None,
     ) -> SolvedContact[AdhesiveMemory]:
         """Solve the contact of a step from the last gap; see `effects.effect.ContactLaw.solve`. Solves use the job's
-        tolerance. If the surfaces detach and the job continues, they are moved far from each other."""
+        tolerance. If no equilibrium exists and the job has `detached: open`, the surfaces are moved far from each
+        other."""
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)
         contact, gap = walk.contact, memory.spare
@@ -381,8 +386,8 @@ class AdhesiveLaw:
         """Return by how much the edges of contact have moved in a step, in half process zones.
 
         This motion in cells is the number of points that entered or left the contact, divided by the length of its
-        edge, which is pi/4 of the number of cell sides along it. A contact whose load is at most an error of the solver
-        counts as `untouched`.
+        edge, which is pi/4 of the number of cell sides along it. If the loads before and after the step are at most
+        errors of the solver, the step is `untouched`.
         """
         least = LEAST_LOAD * self._attraction.strength
         separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
@@ -513,8 +518,8 @@ class AdhesiveLaw:
 
 
 def end_of(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment that a checkpoint holds; None if there is none, if the job continues after
-    a detachment, or if it has another history."""
+    """Return time and load of the detachment that a checkpoint holds; None if it holds none, if the job continues after
+    a detachment, or if the checkpoint belongs to a job with another history."""
     section = job.section("adhesion")
     return None if section is None or section.detached == "open" else end_in(job, saved)
 

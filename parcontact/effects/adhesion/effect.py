@@ -1,15 +1,17 @@
 """The effect of adhesion: columns, rules and warnings of the section `adhesion`, and energies of adhesive contacts.
 
-Energies are the work of the load, the energy of the surfaces, and losses in snaps.
+The energies of a run are the work of the load, the energy of the attraction, and the energy lost in snaps.
 
-In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
-F_t ds`. The difference between the gain and this work is lost in a snap if the load could not have supplied it on any
-path between the two states. Otherwise the difference is an error of the rule, and the work is set to the gain.
+In a step the rigid surface does the work `F dd - F_t ds` along the path of its load, with the normal force F, the
+change dd of the approach, the tangential force F_t and the distance ds that it slides; the integral is taken by the
+trapezoidal rule. The gain is the increase of the energy of the body, including what it dissipates, and of the energy of
+the attraction. If the work exceeds the gain by more than the error of the rule can explain, the difference is lost in a
+snap. Otherwise the difference counts as an error, and the work is set to the gain.
 
 Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
-load on this path depends on inertia, which the model does not have. From the last equilibrium on, the work is taken as
-the least that the change needs, and as 0 if energy is released; this energy is lost. While surfaces are detached,
-neither work nor losses change.
+load in these states depends on inertia, which the model does not have. So the work in such a step is that up to the
+last equilibrium, or the gain if this is larger. The excess of the work over the gain is lost. While the surfaces are
+detached, neither work nor losses change.
 """
 
 from __future__ import annotations
@@ -110,7 +112,8 @@ NO_ENERGIES = AdhesiveEnergies()
 
 
 def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
-    """Return the energies after a step. `past` are those before it, and `area` [m^2] is the area of the box."""
+    """Return the energies after the step that `instant` describes. `past` are the energies before it, and `area` [m^2]
+    is the area of the box."""
     numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
     surfaces = numbers["surface_energy"]
     gained = instant.gained + surfaces - past.surfaces
@@ -183,7 +186,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the range [m] that `auto` means on the mesh of the job, by its key; empty if a range is given."""
+        """Return the range [m] that `auto` means on the mesh of the job, under the key `adhesion.range`; nothing if the
+        job gives a range."""
         reach = chosen_range(job)
         return {} if reach is None else {"adhesion.range": reach}
 
@@ -253,8 +257,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return AdhesionMemory()
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
-        """Return the changes after a step: the energies and the columns. No errors are stated across a snap. The remark
-        warns of the first step in which the edges of contact of a viscoelastic body move too far."""
+        """Return the changes after a step: the energies and the columns. No errors are stated across a snap. A remark
+        warns once, if edges of contact of a viscoelastic body move so far in a step that rates are not resolved."""
         solved, energies = instant.solved, memory.energies
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:

@@ -11,26 +11,27 @@ mean 0, a is the displacement per unit of uniform pressure, and `p = K (g + h) +
     m = (mean(g + h) + d)/a                under a given approach, a > 0,
     mean(g) = -mean(h) - d, which gives m  under a given approach, a = 0 (a periodic half space).
 
-The solution is one of many stationary points of `E = <g + h, K (g + h)>/2 - sum gamma(g)` and the energy of m, with `d
-gamma/dg = -sigma`. The solve starts at the gap of the last step, E falls in every iteration, and no barrier is crossed
-deliberately, so that the history decides the branch. One iteration:
+The solution is one of many stationary points of the energy E, which is `<g + h, K (g + h)>/2 - sum gamma(g)` plus the
+energy of the uniform pressure m, with `d gamma/dg = -sigma`. The solve starts at the gap of the last step, E falls in
+every iteration, and no barrier is crossed deliberately, so that the history decides the branch. One iteration:
 
 1. The working set consists of open points (g > 0) and of points in contact under tension (c < 0).
 2. The residual is `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`.
 3. The direction is `t = z + beta t` (Polak and Ribiere), or `t = z` where that is no descent.
 4. The change of the gap is `w = max(g - alpha t, 0) - g`, with the alpha that would have been best for the last step.
-5. `g <- g + theta w` with Newton's step, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`. Where this curvature is not
-   clearly positive, the majorized step `-<c, w>/<w, K w>` lowers E, as gamma is concave; under a load, K then gets a
-   small stiffness of mean values. theta is limited by the gaps. A change that closes gaps is made in full, theta = 1,
-   if Newton's step is at least WHOLE. If limiting the gaps makes w raise E, a smaller alpha is tried.
+5. The new gap is `g + theta w`. theta is Newton's step `-<c, w>/(<w, K w> - <w, (-sigma') w>)` if its denominator, the
+   curvature of E along w, is clearly positive. Otherwise it is the majorized step `-<c, w>/<w, K w>`, which lowers E as
+   gamma is concave; under a load, K then gets a small stiffness of mean values. theta is limited so that no gap becomes
+   negative. If w closes gaps and Newton's step is at least WHOLE, theta is 1. If w would raise E because it was limited
+   to gaps of at least 0, a smaller alpha is tried.
 6. E must not rise. Otherwise the step is halved.
 
-An iteration applies two operators: `A c`, which also gives the certificate, and `K w`, as the pressure changes by
-`theta K w`.
+An iteration applies two operators: A to c, which also gives the certificate, and K to w, which gives the change of the
+pressure, `theta K w`.
 
 Where the mean gap is given, c, z and t are centred, and w is scaled to keep this mean. V. Rey, G. Anciaux, J.-F.
-Molinari, Comput. Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D.
-Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 have the working set. All numbers are dimensionless.
+Molinari, Comput. Mech. 60 (2017) 69 use these gradients without a preconditioner; M. Bugnicourt, P. Sainsot, D.
+Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 use the working set. All numbers are dimensionless.
 
 The attraction sigma, its energy gamma and its slope follow from a `Law`. It has a `kind` (EXPONENTIAL or DUGDALE), a
 strength s, a range rho and a ramp r,
@@ -107,7 +108,7 @@ def energy(law, g, sigma):
 
 @loop
 def softening(law, sigma):
-    """Return the slope `-d sigma/dg` of a law where the attraction is sigma."""
+    """Return `-d sigma/dg`, by which the attraction falls with the gap, at the gap where the attraction is sigma."""
     if law.kind == EXPONENTIAL:
         return sigma / law.range
     return law.strength / law.ramp if 0.0 < sigma < law.strength else 0.0
@@ -126,7 +127,8 @@ def attract(law, g, sigma):
 
 @loop
 def press(g, q, sigma, step, image):
-    """Add `step image` to the pressure q. Return the number of open points, and the sum of `q + sigma` over them."""
+    """Add `step image` to q, the pressure without its mean. Return the number of open points, and the sum of `q +
+    sigma` over them."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -194,7 +196,7 @@ def certificate_sums(working, g, h, q, mean, sigma, z):
 @loop
 def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
     """Return the sums of z, t, c z, e z and c t over the working set. c is the residual `q + mean + sigma`, and e its
-    change in the last step, `step image + sigma - sigma_old + shift`."""
+    change in the last step, `step image + sigma - sigma_old + shift`; `shift` is the change of the mean."""
     sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_c_z, row_e_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -1,19 +1,20 @@
-"""Results of adhesion in texts and tables: pull-offs, the loads at which adhesive contacts detach, from the rows of a
-run.
+"""Results of adhesion in texts and tables: the pull-offs of a run, from its rows. A pull-off is the largest tension
+before a contact detaches.
 
-The largest tension lies between steps. If the load is higher by a at the time s before the row of the lowest load, and
-by b at the time t after it, the vertex of the parabola through the three points is below the lowest load by
+The largest tension lies between steps. Let the load be higher than the lowest one by a in the row before it, which is
+earlier by the time s, and higher by b in the row after it, which is later by the time t. Then the vertex of the
+parabola through the three points is below the lowest load by
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
 The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, of
 PULL_OFF times the median relative mesh error of the contact area up to this row, and of ZONE times the fourth power of
 the side of a cell over the length of a process zone: cells of a zone or more hold the edge of contact. In tests,
-spheres were pulled off at seven rates with chosen steps, at accuracies from 0.1 to 0.005: all loads differed from runs
-with 1500 equal steps by less than this error without the part of the mesh.
+spheres were pulled off at seven rates with chosen steps, at accuracies from 0.1 to 0.005: all pull-offs differed from
+runs with 1500 equal steps by less than this error without the part of the mesh.
 
-The pull-off is the lowest load itself if the pull has no later row, if the contact snaps, or if it still holds. The
-difference to the load of the row before then replaces e in the error.
+If the pull has no later row, if the contact snaps, or if it still exists at the end, the pull-off is the lowest load
+itself. Its error then has the difference between the lowest load and the load in the row before it in place of e.
 """
 
 import math
@@ -46,8 +47,8 @@ Values = NDArray[np.float64]
 class PullOff(NamedTuple):
     """A pull-off. `row` is the row of the lowest load. `pressure` is the load of the pull-off, and `between` the error
     of this load by the steps, both as mean pressures [Pa]. `lost` is the first row without contact: the number of rows
-    if the run ended with the detachment, None if the contact holds. `mesh` is the relative error of the load by the
-    mesh, NaN if unknown."""
+    if the run ended with the detachment, None if the contact still exists. `mesh` is the relative error of the load by
+    the mesh, NaN if unknown."""
 
     row: int
     pressure: float
@@ -65,9 +66,9 @@ def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> l
     `contact_area` and `error_area`; `detached` is True if the run ended because its surfaces detached, and `coarseness`
     is the side of a cell over the length of the process zone.
 
-    A pull begins at the smallest separation, or at the last approach before contact is lost; earlier pulls that the
-    contact survived do not count. A pull ends when the separation stops growing, as detached surfaces may later attract
-    each other more strongly.
+    A pull is a range of rows in which the surfaces move apart. If contact is lost, the last such range before it
+    counts; otherwise the pull begins where the surfaces are closest. Rows after the loss of contact belong to the pull
+    as long as the surfaces move apart, since a lower load may follow there.
     """
     names = "time", "pressure", "approach", "contact_area"
     time, pressure, approach, area = (np.asarray(columns[name], float) for name in names)
@@ -170,5 +171,6 @@ def swept(run: Results) -> Iterator[tuple[str, float]]:
 
 
 def telling_row(run: Results) -> Iterator[int]:
-    """Yield the row of the last pull-off, which the summary of the run shows."""
+    """Yield the number of the row of the last pull-off, which shows the contact of the run best
+    (`results.Results.telling_row`)."""
     yield from (pull.row for pull in _pulls(run)[-1:])

@@ -9,17 +9,18 @@ A node that crosses the end of Dugdale's law would snap, with an error proportio
 the computed law ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end of the
 process zone, where the gap rises by about 2 rho h/l in a cell.
 
-The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). Tabor's
-and Johnson's parameters classify adhesive contacts,
+The process zone is the strip at the edge of a contact in which the traction rises. It has the length `l = E* rho^2/w`,
+with E* = 2 G/(1 - nu). Tabor's and Johnson's parameters classify adhesive contacts,
 
     mu = (R w^2/(E*^2 rho^3))^(1/3),        alpha^2 = 2 w lambda/(pi^2 E* h^2),
 
 of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose
 crests are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 
-A sphere attracts a flat body at the gap d with `2 pi R gamma(d)`, of which the share `gamma(d + r^2/(2 R))/gamma(d)`
-comes from points further than r from its axis. Summed over the points of a mesh with cells h, the force of the
-exponential law has an error of up to `4 exp(-2 pi^2 R rho/h^2)`, by Poisson's sum of a Gaussian.
+A sphere of radius R attracts a flat body at the gap d with the force `2 pi R gamma(d)`. The share `gamma(d + r^2/(2
+R))/gamma(d)` of this force comes from points further than r from the axis of the sphere. If the force of the
+exponential law is a sum over the points of a mesh with cells of side h, it has a relative error of up to `4 exp(-2 pi^2
+R rho/h^2)`, by Poisson's sum of a Gaussian.
 """
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ class AdhesionLaw:
 
     @property
     def ramp(self) -> float:
-        """Ramp of Dugdale's law [m], 2 rho h/l and at most 2 rho for cells h; 0 for the exponential law."""
+        """Range of gaps [m] over which the attraction of Dugdale's law falls to 0: 2 rho h/l for cells of side h, at
+        most 2 rho. It is 0 for the exponential law."""
         return 2.0 * self.range * self.cell / max(self.zone, self.cell) if self.kind == "dugdale" else 0.0
 
     def tabor(self, modulus: float, radius: float) -> float:

@@ -64,8 +64,8 @@ def _at(zero: Zero, body: Prony, moduli: Array, whole: Prony) -> float:
 
 
 class Counterbody(Part):
-    """The rough body if it deforms, too: any section that `material` may be, such as `{model: elastic, shear_modulus:
-    5.0e6}` or `{include: NAME}`. Without this section the rough body is rigid ({doc}`limits`)."""
+    """The rough body if it deforms, too: all that the section `material` may contain, such as `{model: elastic,
+    shear_modulus: 5.0e6}` or `{include: NAME}`. Without this section the rough body is rigid ({doc}`limits`)."""
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -75,8 +75,8 @@ class Counterbody(Part):
 class Pair(Zener):
     """A rubber and its counterbody as one body, with Poisson's ratio, hardness, shift and measured range of the rubber.
 
-    Each body is shifted to its temperature before both are joined. `branches` and `modulus_inf` are divided by the
-    shift of the rubber, which the base class applies again. A relaxed counterbody has its long-term modulus.
+    Each body is shifted to its temperature before both are joined. The base class shifts `branches` and `modulus_inf`
+    by the factors of the rubber, so that these keys hold the series of the pair divided by these factors.
     """
 
     _first: AnyMaterial = PrivateAttr()
@@ -85,8 +85,9 @@ class Pair(Zener):
 
     @classmethod
     def of(cls, first: AnyMaterial, second: AnyMaterial, relaxed: bool) -> Pair:
-        """Return two bodies as one. The modulus of the second is scaled by its 1 - nu, so that compliances add up. A
-        counterbody that is `relaxed` has its long-term modulus."""
+        """Return two bodies as one. The moduli of the second body are multiplied by the ratio of 1 - nu of the first to
+        that of the second: then the compliances (1 - nu)/G of both add up. If `relaxed` is True, the second body is
+        elastic with its long-term modulus."""
         own, scale = first.fitted, (1.0 - first.poisson) / (1.0 - second.poisson)
         other = Prony(second.fitted.long_modulus, np.zeros(0), np.zeros(0)) if relaxed else relaxation_of(second)
         both = pair(relaxation_of(first), (scale * other.modulus_inf, scale * other.moduli, other.relaxation_times))
@@ -104,7 +105,7 @@ class Pair(Zener):
 
     @property
     def given(self) -> AnyMaterial:
-        """Return the rubber without its counterbody."""
+        """Return the material that the job gives: the rubber without its counterbody."""
         return self._first
 
     def at(self, temperature: float) -> Pair:
@@ -179,8 +180,8 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def changed_material(job: Any) -> Any:
-        """Return the pair of both bodies, which replaces the material; in a steady state the counterbody has
-        relaxed."""
+        """Return the pair of both bodies, which replaces the material. For steady sliding the counterbody has its
+        long-term modulus, as it carries the roughness and sees a load at rest."""
         relaxed = _has_relaxed(job)
         if isinstance(job.material, Pair) or (relaxed and job.counterbody.fitted.long_modulus == 0.0):  # refused
             return job.material
@@ -224,8 +225,9 @@ class CounterbodyThatDeforms(Effect[None]):
 
 
 def frequencies(job: Any) -> list[float]:
-    """Return at most SHOWN frequencies [Hz] at which moduli are shown: frequencies of the job's sliding, else of the
-    relaxation of the pair; an empty list if nothing relaxes."""
+    """Return at most SHOWN frequencies [Hz] at which `facts` states the moduli of the pair; an empty list if nothing
+    relaxes. They span the range that the sliding of the job excites; without sliding, the range in which the pair
+    relaxes."""
     times = relaxation_of(job.material).relaxation_times
     if not times.size:
         return []

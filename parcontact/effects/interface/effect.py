@@ -98,8 +98,9 @@ def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]
 
 
 class Interface(Part):
-    """The `interface` section: friction by a shear stress, constant or a bell curve of the logarithm of the velocity,
-    or by a coefficient; with `stick: true` points stick until the traction reaches this bound."""
+    """The `interface` section: friction by a shear stress, which is constant or a bell curve of the logarithm of the
+    velocity, or by a coefficient. With `stick: true` this friction is an upper bound: points stick until the traction
+    reaches it."""
 
     label: ClassVar[str] = "interface"
     shear_stress: Positive | None = Field(
@@ -162,9 +163,10 @@ class InterfaceEffect(Effect[Memory]):
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
-    """Return the parts of the friction coefficient by the body and by the interface: the components of both forces
-    along the total force, divided by the normal force. The force of the interface opposes a `velocity`, of any size. A
-    part is negative if its force opposes the total force, as the force of the interface may after a reversal."""
+    """Return the two parts of the friction coefficient, due to the body and due to the interface: the components of
+    both forces along the total force, divided by the normal force. The force of the interface opposes a `velocity`, of
+    any size. A part is negative if its force opposes the total force, as the force of the interface may after a
+    reversal."""
     scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
     along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
     own = 0.0 + along * measures.friction_interface  # not -0
@@ -186,7 +188,8 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
 
     @staticmethod
     def shear(job: Any) -> InterfaceFriction | None:
-        """Return the shear stress of the section, shifted to the temperature of the material; None with `stick`."""
+        """Return the shear stress of the section, shifted to the temperature of the material. With `stick: true` return
+        None, as the effect of stick finds the tractions."""
         law: Interface = job.section("interface")
         return None if law.stick else law.friction(job.material)
 

@@ -4,9 +4,10 @@ The rigid surface moves by D along itself, the points of the body by u under tra
 
     |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
-A shear strength that depends on velocity is taken at the velocity of the surface along itself in each step, at all
-points, so that a step has one solution. While the surface rests, the last strength holds. Before the surface has moved,
-there are no tractions, and the highest strength is the bound.
+A shear strength that depends on the velocity is the same at all points in a step. It is taken at the velocity of the
+surface along itself, and not at the velocities of slip, for which a step could have several solutions. While the
+surface rests, the last strength holds. Before the surface has moved, there are no tractions, and the highest strength
+is the bound.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
@@ -22,13 +23,15 @@ its last displacement plus the increment of D (its `target`), and
 
 Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
 and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
-step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
-are not reset to u, and targets of points that slip remember the difference between tractions and bounds, so that
-residuals of solves do not add up over many steps.
+step. A point without contact has g = u, so that its slip counts from its first contact.
 
-A surface that rolls moves as a shape, while its points move along the body by a share of this motion, the creep (F. W.
-Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the shape. Sliding has the creep
-1, free rolling the creep 0.
+The residuals of solves must not add up over many steps. So the target g of a point that sticks is not set to the
+displacement u that was found, and the target of a point that slips contains the difference between its traction and its
+bound, which the next solve corrects.
+
+The shape of a surface that rolls moves over the body, but its points move along the body only by a share of this
+motion, the creep (F. W. Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the
+shape. Sliding has the creep 1, free rolling the creep 0.
 
 With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip is
 
@@ -80,7 +83,8 @@ STICKING = Fit(
 
 
 class BoundedTraction(NamedTuple):
-    """Tractions, a map of two stacked components, and the map of their bounds, both divided by the modulus alpha."""
+    """The map of the tractions and the map of their bounds, both divided by the modulus alpha and in the run's units.
+    The map of the tractions has the components along x and y one above the other (`solver.stacked`)."""
 
     traction: Array
     bound: Array
@@ -88,7 +92,7 @@ class BoundedTraction(NamedTuple):
 
 @dataclass(frozen=True)
 class StickMemory:
-    """Memory of stick and slip. Maps are in the run's units. They have two stacked components, except the bounds.
+    """Memory of stick and slip. Maps are in the run's units, and have two stacked components except those of bounds.
 
     `body` is the memory of the displacements along the surface. `last` has the tractions of the last step and their
     bounds, divided by its modulus `alpha`; the next ones are put into `spare`. `target` is the displacement that points

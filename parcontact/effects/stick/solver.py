@@ -7,29 +7,28 @@ With A the operator of the body, from tractions to displacements, and bounds f o
 w is the slip in a step in which a point that sticks ends at the displacement e. The solution minimizes the convex
 function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
 
-1. Points slip where t was shortened to its disc and w is not opposite to t; the others stick. A traction that slips can
-   only turn. Turning it by an angle is resisted by the body, and by its slip: to A, `|w|/f` is added.
-2. The residual r is w where points stick, and the part of w across t where they slip. The direction z is `S E' K E S r
-   + (1 - S^2)/(1/kappa + |w|/f) r + k <w>`. K is close to the inverse of A, E extends each component beyond the points
-   that move along it (`preconditioner.extension`), and S, 1 where points stick, is small where slip resists more than
-   the shortest waves. K is left out for a component with a small residual. <w> is the mean slip of the points that
-   stick. In a periodic box a mean traction does not move the surface, and these points resist mean slip with about `k =
-   kappa/(1 - m)`, where m is their share of the box: much more than K assumes.
-3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
-   minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and longer ones
-   are shortened to f.
-4. Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
-   least J, and A t follows without another application of A. So J never rises. If all points stick and J would be least
-   far beyond the new tractions, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows.
-5. If t has moved by a small part of the change, the next iteration takes `t + kappa w`, shortened to its disc, for the
-   new tractions, which always descends.
+1. Points slip where t was shortened to its disc and w is not opposite to t; the others stick. The traction of a point
+that slips can only turn. Both the body and the slip resist this: A is replaced by `A + |w|/f` there. 2. The residual r
+is w where points stick, and the part of w across t where they slip. The direction z is `S E' K E S r + (1 -
+S^2)/(1/kappa + |w|/f) r + k <w>`. K is close to the inverse of A, and E extends each component beyond the points that
+move along it (`preconditioner.extension`). S is 1 where points stick; where they slip it is the root of `a/(a +
+|w|/f)`, with the compliance a of the shortest waves. K is left out for a component with a small residual. <w> is the
+mean slip of the points that stick. In a periodic box a mean traction does not move the surface, and these points resist
+mean slip with about `k = kappa/(1 - m)`, where m is their share of the box: much more than K assumes. 3. With d the
+last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma minimizes J along d:
+both follow from A d, which is known. Then tractions that slip get the length f, and longer ones are shortened to f. 4.
+Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
+least J, and A t follows without another application of A. So J never rises. If all points stick and J would be least
+far beyond the new tractions, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows. 5. If
+t has moved by a small part of the change, the next iteration takes `t + kappa w`, shortened to its disc, for the new
+tractions, which always descends.
 
 kappa is a stiffness of the contact as a whole. The certificate is the larger of two errors of t, divided by the sum of
 |t|: `sum |P(t + kappa w) - t|` with P(t) = t shortened to its disc, and the change in step 3, where K measures
 residuals of all wavelengths. The certificate is 0 only for the solution, and equals the relative error of tractions
-where K is close to the inverse of A. Errors of many small steps would add up, as points slip by them. So the
-certificate must also be below a share of the change of t since the last step, unless it is below a tenth of the
-tolerance. `contact.solver` uses the same method for the constraint p >= 0.
+where K is close to the inverse of A. In many small steps points would slip by these errors, which add up. So a solve
+ends when the certificate is below the tolerance and below a share of the change of t since the last step; a tenth of
+the tolerance always suffices. `contact.solver` uses the same method for the constraint p >= 0.
 
 The operator A takes tractions along the surface of a half space to displacements along the surface.
 
@@ -542,12 +541,14 @@ def _step_along_last(step: float, r_z: float, r_d: float, z_c: float, d_c: float
 def settle_slips(bound, stiffness, alpha, t_x, t_y, alpha_old, old_x, old_y, u_x, u_y, target_x, target_y, slipping):
     """Find the points that stick after a step, and move the targets of all others.
 
-    With `s = target - u` and the stiffness k, a point sticks if `|t + k s|` is below its bound. Every other point slips
-    by `s - r`, and its target is `u + r`, where `k r` is the difference between t and `t + k s` shortened to its bound.
-    This r is 0 for exact tractions; otherwise it adds up over steps until a solve corrects t. A point that slips loses
-    `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative. The map `slipping`, unless it is empty, receives
-    `t (s - r)`, which is proportional to the power at the end of the step. Return the sums of losses, of t along x, of
-    t along y and of bounds, the number of points that stick, and the sum of `t (s - r)`.
+    Let s be `target - u`, k the `stiffness`, and P the traction `t + k s` shortened to its bound. A point sticks if `t
+    + k s` is shorter than its bound. For every other point let `r = (P - t)/k`, which is 0 for exact tractions: the
+    point slips by `s - r`, and its target becomes `u + r`. So an error of t is kept until a solve corrects it. A point
+    that slips loses the energy `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative.
+
+    The map `slipping`, unless it is empty, gets `t (s - r)`, which is proportional to the power of slip at the end of
+    the step. Return six sums: of the losses, of t along x, of t along y, and of the bounds; the number of points that
+    stick; and the sum of `t (s - r)`.
     """
     writes = slipping.size > 0
     lost, total_x, total_y, most, stuck, power = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
