@@ -33,7 +33,8 @@ class Compound:
     `shift` with temperature, None for a table of one temperature.
 
     `poisson` is the Poisson ratio, by which Young's moduli become shear moduli. `weigh` names the fitted moduli:
-    storage, loss or both. `found` is the result of the superposition of the sweeps, None if the shift was given.
+    storage, loss or both. `found` is the shift that was fitted to sweeps at several temperatures, None if the shift was
+    given or there is none.
     """
 
     measured: Any
@@ -44,7 +45,7 @@ class Compound:
     found: "Superposition | None" = None
 
     def material(self) -> dict[str, Any]:
-        """Return the fitted material as the section of a job."""
+        """Return the fitted material as the section `material` of a job, in plain data."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
         degrees = self.measured.temperatures
         return {
@@ -64,7 +65,7 @@ class Compound:
         return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
 
     def doubts(self) -> list[str]:
-        """Return warnings about a misfit larger than the scatter, and about tables that are not of rubber."""
+        """Return warnings about a misfit larger than the scatter, and about moduli that no rubber has."""
         from . import moduli
 
         series, found = self.series, list(self.measured.doubts)
@@ -198,10 +199,12 @@ def fitted(
 ) -> Compound:
     """Return the compound fitted to a table of measured moduli.
 
-    `law` is the name of a shift law whose constants are fitted, wlf, arrhenius or free, or a shift with known
-    constants. `vertical` is the law of b_T (`series.superpose`) for a shift without one. `reference` [deg C] is the
+    `poisson` converts Young's moduli to shear moduli. `law` is the name of a shift law whose constants are fitted, wlf,
+    arrhenius or free, or a shift with known constants. `vertical` is the law of the vertical factors b_T of moduli
+    (`series.superpose`); it has no effect on a known shift with a vertical law of its own. `reference` [deg C] is the
     reference temperature, by default the middle one of the measured temperatures. `error` is the accepted relative
-    error of both moduli. Raises InputError for a table that cannot be read, and for one that no series fits.
+    error of both moduli, and `weigh` names the moduli that are fitted. Raises InputError for a table that cannot be
+    read, and for moduli that no series fits.
     """
     from . import moduli, series
     from .series import log_factors, superpose

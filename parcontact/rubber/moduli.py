@@ -4,7 +4,8 @@ Headers, units and numbers are read by `text_tables`: two header rows, as in pyv
 behind a slash. The columns are:
 
 * `f, omega, t, f_set` (Hz, rad/s, s) and `T` (C, K);
-* `E_stor, E_loss, E_relax`, or E', E'', E(t), or G instead of E (Pa, kPa, MPa, GPa), or in words, Storage Modulus;
+* `E_stor, E_loss, E_relax`, also written E', E'', E(t), or in words, such as Storage Modulus; the same with G (Pa, kPa,
+  MPa, GPa);
 * `tan_del`; |E*| and |G*|, absolute values, and delta, the phase angle (deg, rad);
 * D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
@@ -39,8 +40,8 @@ RISE = 0.1  # accuracy: relative rise of a relaxation modulus that scatter may c
 
 
 def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: Array | None) -> None:
-    """Raise InputError for values that no measurement has: rates or times `at` [rad/s or s], moduli `storage` [Pa] and
-    temperatures [deg C], each of shape (n,)."""
+    """Raise InputError for too wide a range of rates or times `at` [rad/s or s], for a largest modulus `storage` [Pa]
+    that no solid has, and for `temperatures` [deg C] that are too low; each of these has the shape (n,)."""
     what = "frequencies" if kind == "frequency" else "times"
     decades = math.log10(at.max()) - math.log10(at.min())
     if decades > MOST_DECADES:
@@ -55,7 +56,7 @@ def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: A
 
 
 def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
-    """Yield warnings about shear moduli [Pa] of `sets` that no rubber has."""
+    """Yield a warning if the largest shear modulus of all `sets` (`Set`) is too high or too low for rubber."""
     largest = max(float(each.storage.max()) for each in sets)
     if largest > GLASS:
         yield f"its largest shear modulus is {largest:.3g} Pa, more than rubber has as a glass: is the unit right?"
@@ -64,7 +65,8 @@ def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
 
 
 def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
-    """Raise InputError if relaxation moduli, or inverse compliances, of a set rise with time."""
+    """Raise InputError if a relaxation modulus, or an inverse compliance, rises with time. Each of the `sets` has the
+    moduli of one temperature [Pa], shape (n,), by rising times."""
     for moduli in sets:
         if moduli[-1] <= (1.0 + RISE) * moduli[0]:
             continue
@@ -77,8 +79,8 @@ def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
 
 
 def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
-    """Return the scatter of moduli: the rms deviation of their logarithms from curves through the two neighbouring
-    points on either side.
+    """Return the scatter of moduli: the rms deviation of the logarithm of each modulus from the curve through the next
+    two points on its left and the next two on its right.
 
     Each of the `sweeps` has rates and moduli, both of shape (n,), in the order of rising rates. The result is NaN if no
     sweep has five points. The interpolation is cubic in the logarithms, so that smooth curves have no scatter.
@@ -113,7 +115,7 @@ EXAMPLE = "f[Hz] E'[MPa] E''[MPa]"
 
 @dataclass(frozen=True)
 class Set:
-    """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
+    """Moduli measured at one `temperature` [deg C], None for a table without temperatures, by rising rates or times.
 
     `at`, shape (n,), are angular frequencies [rad/s] of a frequency sweep, or times [s] of relaxation or creep.
     `storage` and `loss`, shape (n,) [Pa], are shear moduli. For relaxation `storage` is the relaxation modulus, for
@@ -130,8 +132,8 @@ class Set:
 class Measurement:
     """All sets of a file in the order of their temperatures; `tension` is True if Young's moduli were converted.
 
-    `derived` is the modulus computed from the other modulus and tan delta: "stor", "loss", or "" for none. `doubts` are
-    sentences about ambiguities and omissions.
+    `derived` names the modulus that the table does not have and that was computed from the other one and tan delta:
+    "stor", "loss", or "" for none. `doubts` are sentences about ambiguities and omissions.
     """
 
     path: Path
@@ -143,11 +145,12 @@ class Measurement:
 
     @property
     def temperatures(self) -> list[float]:
-        """Measured temperatures [deg C], rising; an empty list if the file has none."""
+        """Return the measured temperatures [deg C], rising; an empty list if the file has none."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
     def without_short_sets(self) -> "Measurement":
-        """Return the sets that are long enough to determine a shift; raises InputError if there are none."""
+        """Return the measurement with only those sets that are long enough to determine a shift; raises InputError if
+        there are none."""
         long = tuple(each for each in self.sets if each.at.size >= LEAST_ROWS)
         short = [each for each in self.sets if each.at.size < LEAST_ROWS]
         if not long:
@@ -164,7 +167,8 @@ class Measurement:
 
 
 def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
-    """Return the measurement in a table, as shear moduli: `G = E/(2 (1 + nu))`. Raises InputError."""
+    """Return the measurement in the file of a table. Young's moduli are converted to shear moduli, `G = E/(2 (1 +
+    nu))`, with the Poisson ratio nu. Raises InputError for a table that cannot be read or that no rubber has."""
     table = read_named_columns(path, "a table of moduli", EXAMPLE, MODULI | OTHERS, _are_enough)
     if len(table.lines) < LEAST_ROWS:
         raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {LEAST_ROWS} were expected")

@@ -1,19 +1,20 @@
 """Fits of Prony series, and of shifts with temperature, to measured moduli.
 
-A Prony series has as many branches as the loss modulus needs:
+A Prony series has as few branches as give the loss modulus everywhere in the measured band:
 
     G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
     J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
 
 A relaxation modulus or a storage modulus hardly determines the loss modulus, on which friction depends. Therefore the
-data are fitted twice. The first fit is a dense spectrum (`Spectrum`), by non-negative least squares of the relative
-errors with a penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum has a
-covariance, and the loss modulus an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J. Weese, Rheol.
-Acta 32 (1993) 65). The second fit is the shortest series that fits both moduli of this spectrum everywhere in the band.
-For creep data the modulus is 1/J*(w) of the spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter
-3).
+data are fitted twice. The first fit yields a dense spectrum (`Spectrum`), by non-negative least squares of the relative
+errors with a penalty on the roughness of the spectrum. The penalty is the prior of a Gaussian process, so that the
+spectrum has a covariance, and the loss modulus an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp,
+J. Weese, Rheol. Acta 32 (1993) 65). The second fit yields the shortest series that fits both moduli of this spectrum
+everywhere in the band. For creep data the modulus is 1/J*(w) of the spectrum (J. D. Ferry, Viscoelastic Properties of
+Polymers (1980), chapter 3).
 
-In time-temperature superposition of measured sets, horizontal factors a_T and vertical factors b_T are fitted together:
+By a shift with temperature, moduli measured at several temperatures form one curve. Its horizontal factors a_T, of
+rates, and its vertical factors b_T, of moduli, are fitted together:
 
     G*(w, T) = b_T G*(a_T w, T_ref)
 
@@ -60,13 +61,14 @@ Errors = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PronySeries:
-    """A fitted Prony series: `modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference.
+    """A fitted Prony series: `modulus_inf` [Pa], `moduli` [Pa] and `times` [s], both of shape (n,), at the reference
+    temperature.
 
-    `error` is the rms relative misfit of the fitted data, and `best` the smallest one of any series. `alone` are the
-    smallest misfits if only the storage modulus, or only the loss modulus, is fitted. `scatter` is the relative scatter
-    of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the range of frequencies
-    in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of the loss modulus
-    inside this range, at its lower end and at its upper end.
+    `error` is the rms relative misfit of the fitted data, and `best` the smallest one of any series. `alone` are two
+    smallest misfits: if only the storage modulus is fitted, and if only the loss modulus is. `scatter` is the relative
+    scatter of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the range of
+    frequencies in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of the loss
+    modulus inside this range, at its lower end and at its upper end.
     """
 
     modulus_inf: float
@@ -88,8 +90,11 @@ class PronySeries:
         return float(self.modulus(np.array([omega]))[0].real)
 
     def response(self, kind: Kind, at: Array) -> Array:
-        """Return what the series predicts for a kind of measurement: storage before loss [Pa] at frequencies [rad/s],
-        shape (2 n,), or G(t) or 1/J(t) [Pa] at times [s], shape (n,)."""
+        """Return the moduli [Pa] of the series as a kind of measurement has them.
+
+        With frequencies `at` [rad/s], shape (n,), these are all storage moduli followed by all loss moduli, shape
+        (2 n,). With times `at` [s] they are G(t) or 1/J(t), shape (n,).
+        """
         if kind == "creep":
             return 1.0 / self._creep(at)
         return np.asarray(kernel(at, kind, self.times) @ np.append(self.moduli, self.modulus_inf))
@@ -130,9 +135,12 @@ def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
 
 @dataclass(frozen=True)
 class ReducedData:
-    """The data of all sets, reduced to one temperature. `at`, shape (n,), are frequencies [rad/s] or times [s];
-    `moduli` [Pa] have the shape (n,) for G(t) or 1/J(t), (2 n,) for storage before loss. Data in the slice `counts` are
-    fitted."""
+    """The data of all sets, shifted to one temperature.
+
+    `at`, shape (n,), are angular frequencies [rad/s] or times [s]. `moduli` [Pa] have the shape (n,) for G(t) or
+    1/J(t), and (2 n,) for all storage moduli followed by all loss moduli. Only data in the slice `counts` of the moduli
+    are fitted, such as the loss moduli.
+    """
 
     kind: Kind
     at: Array
@@ -141,24 +149,24 @@ class ReducedData:
 
     @property
     def counted(self) -> int:
-        """Number of fitted data."""
+        """Return the number of fitted data."""
         return len(self.moduli[self.counts])
 
     @property
     def rates(self) -> tuple[float, float]:
-        """Lowest and highest rate of the data [1/s]."""
+        """Return the lowest and the highest rate of the data [1/s]: angular frequencies, or inverse times."""
         rates = self.at if self.kind == "frequency" else 1.0 / self.at
         return float(rates.min()), float(rates.max())
 
     @property
     def band(self) -> tuple[float, float]:
-        """Range of angular frequencies [rad/s] in which the data determine the moduli."""
+        """Return the range of angular frequencies [rad/s] in which the data determine the moduli."""
         low, high = self.rates
         return (low, high) if self.kind == "frequency" else (low, 2 * math.pi / EARLIEST * high)
 
     def columns(self, times: Array) -> Array:
-        """Return the `kernel` of the fitted data, divided by these data: the weights of an exact fit give 1 for each of
-        them. Data of creep are J."""
+        """Return the `kernel` of the fitted data, divided by the data. Multiplied with the weights of an exact fit it
+        is 1 for each of the data. For creep the kernel is one of J, and is divided by J = 1/`moduli`."""
         found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
         return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
 
@@ -168,8 +176,10 @@ class ReducedData:
         return float(np.sqrt(np.mean(np.log(ratio) ** 2)))
 
     def find_spring(self, storage: Array) -> float:
-        """Return the modulus [Pa] of a spring that leaves no mean relative deviation from the measured storage moduli
-        if it is added to the storage moduli `storage` [Pa] of a spectrum; at least 0."""
+        """Return the modulus [Pa] of the spring that a spectrum with the storage moduli `storage` [Pa] lacks.
+
+        With this spring the mean relative deviation from the measured storage moduli is 0. The modulus is at least 0.
+        """
         measured = self.moduli[: self.at.size]
         return max(0.0, float(np.mean(1.0 - storage / measured) / np.mean(1.0 / measured)))
 
@@ -182,7 +192,8 @@ class ReducedData:
 def reduce_sets(
     sets: Sequence[Set], kind: Kind, logs: tuple[Sequence[float], Sequence[float]] | None = None, weigh: Weigh = "both"
 ) -> ReducedData:
-    """Return the data of all sets at one temperature; `logs` are log10 of a_T and of b_T of each set."""
+    """Return the data of all sets, shifted to one temperature. `logs` are log10 of a_T and of b_T of each set; without
+    them nothing is shifted. `weigh` names the moduli that are fitted."""
     sign, (horizontal, vertical) = 1.0 if kind == "frequency" else -1.0, logs or [[0.0] * len(sets)] * 2
     shifted = list(zip(sets, horizontal, vertical, strict=True))
     at = np.concatenate([each.at * 10.0 ** (sign * a) for each, a, _ in shifted])
@@ -192,8 +203,8 @@ def reduce_sets(
 
 
 def best_residuals(data: ReducedData, per_decade: int = DENSE) -> Array:
-    """Return the relative residuals of the fitted data for the best series of any number of branches, with `per_decade`
-    possible times per decade."""
+    """Return the relative residuals of the fitted data for the series that fits them best, whose number of branches is
+    free. Its relaxation times are chosen from `per_decade` times per decade."""
     low, high = data.rates
     first, last = (round(per_decade * (math.log10(1.0 / rate) + side)) for rate, side in ((high, -SPARE), (low, SPARE)))
     columns = data.columns(np.power(10.0, np.arange(first, last + 1) / per_decade))
@@ -207,7 +218,7 @@ def _non_negative(columns: Array, goal: Array | None = None) -> Array:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A dense spectrum of relaxation times (for creep: retardation times) [s] with weights [Pa or 1/Pa].
+    """A dense spectrum: relaxation times [s] with weights [Pa], or for creep retardation times [s] with weights [1/Pa].
 
     `deviations` is a matrix whose product with its transpose is the covariance of the weights.
     """
@@ -412,8 +423,8 @@ BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, b
 
 @dataclass(frozen=True)
 class Superposition:
-    """A fitted shift, its `misfit` (rms, relative), and the result with `free` vertical factors if it is much
-    better."""
+    """A fitted shift, and its relative rms misfit. `free` is the result with a free vertical factor b_T at each
+    temperature, or None unless its misfit is much smaller."""
 
     shift: Shift
     misfit: float
@@ -425,9 +436,10 @@ def superpose(
 ) -> Superposition:
     """Return the shift that joins the sets of a measurement to one curve at a reference temperature [deg C].
 
-    `law` is wlf, arrhenius or free (factors at the measured temperatures), whose constants are fitted, or a known
-    shift. `vertical` is the law of b_T: density, free factors, none (1), or (auto) density unless the data prefer
-    none. Raises InputError if the sets are too few or do not overlap.
+    `law` is the name of a law whose constants are fitted, wlf, arrhenius or free (a factor at each measured
+    temperature), or a known shift. `vertical` is the law of b_T: `density`, `free` (a factor at each measured
+    temperature), `none` (b_T = 1), or `auto` (density, unless none fits better). `weigh` names the moduli that are
+    fitted. Raises InputError for fewer than two sets, and if no constants join them to one curve.
     """
     known = measured.temperatures
     if len(known) < 2:
