@@ -10,10 +10,8 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -198,13 +196,11 @@ def sphere(history: Sequence[Json], points: int = 32, size: float = 3e-3, **job:
 PER_POINT = 1.2e-8  # time of an operator call per point on a machine of 2022 [s], for the share that is named
 POINTS = 512  # tuning: points along each side of the contact that is timed
 SLOW = 4.0  # tuning: time of an operator call above which a warning is given, over the usual time
-SLOW_DISK = 50e6  # tuning: writing rate below which a warning is given [bytes/s]
-TRIED_BYTES = 32 << 20  # tuning: size of the file that is written to measure the rate [bytes]
 SAME = 1e-6  # accuracy: limit on the difference of pressures, over the largest pressure
 STEPS = 4  # tuning: steps of the run whose files are read back
 
 
-def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
+def describe_machine(comm: "MPI.Intracomm") -> Iterator[str]:
     """Yield lines on ranks, libraries and times, and warnings; collective: all ranks must exhaust the iterator."""
     yield from provenance.lines(comm)
     yield f"HDF5 {h5py.version.hdf5_version}"
@@ -219,10 +215,6 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
     yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms per operator call"
     if seconds > SLOW * usual:
         yield f"warning: this is slow, {1e3 * usual:.2g} ms is usual; do other programs run, or too many threads?"
-    rate = comm.bcast(_measure_write_rate(where))
-    yield f"files: {rate / 1e6:.3g} MB/s in {where}"
-    if rate < SLOW_DISK:
-        yield f"warning: this is slow, {SLOW_DISK / 1e6:g} MB/s is usual; save fewer fields, or write to another disk"
 
 
 def prepare_loops(comm: "MPI.Intracomm") -> str:
@@ -281,20 +273,6 @@ def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
         comm.Barrier()
         if comm.rank == 0:
             shutil.rmtree(place, ignore_errors=True)
-
-
-def _measure_write_rate(directory: Path) -> float:
-    """Return the writing rate [bytes/s] in the directory or its nearest existing parent, by a temporary file; NaN if
-    that cannot be measured."""
-    place = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
-    with suppress(OSError), TemporaryFile(dir=place) as file:
-        data = os.urandom(TRIED_BYTES)
-        began = time.perf_counter()
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-        return TRIED_BYTES / (time.perf_counter() - began)
-    return math.nan
 
 
 ITERATIONS = 60  # tuning: limit on the iterations of a contact solve

@@ -123,20 +123,16 @@ def _section(section: SectionSchema) -> Iterator[str]:
 
 
 def _key(key: Key, meaning: str, example: str) -> Iterator[str]:
-    facts = [f"must be {key.must_be}"]
+    facts = [f"Must be {key.must_be}"]
     facts += [f"range: {key.within}"] if key.within else []
     facts += [f"unit: {key.unit}"] if key.unit not in ("", "-") else []
     facts.append("required" if key.required else f"default: `{key.default}`" if key.default else "optional")
-    yield f"`{key.word}`\n: {meaning} *{_capital('; '.join(facts))}.*"
+    yield f"`{key.word}`\n: {meaning} *{'; '.join(facts)}.*"
     yield f"  Example: `{key.word}: {example}`\n" if example != "" else ""
 
 
 def _words(words: tuple[str, ...]) -> str:
     return ", ".join(f"`{word}`" for word in words)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 CODE = re.compile(r"^(```.*?^```$|\$\$.*?\$\$[ ,.]*$)", re.MULTILINE | re.DOTALL)

@@ -40,12 +40,6 @@ def load_map(path: Path, overrides: Sequence[str]) -> Job:
         raise InputError(f"{error}; {HOW if OF_POSITIONS in str(error) else HOW_SIZE}") from None
 
 
-def refuse_taken(target: Path | None) -> None:
-    """Raise InputError if the file `target` for a new job exists already."""
-    if target is not None and os.path.lexists(target):
-        raise InputError(f"--job: {target} already exists; give another name")
-
-
 def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     """Make a job from a measured map that a user can change and run; yield lines of text about it.
 

@@ -79,7 +79,9 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
         if name not in scene.effects:
             found[name] = sum(np.dtype(dtype).itemsize for dtype in effect.maps(job)) * math.prod(slab.shape)
     if rank is None and choices(job).spectrum.on:
-        found[SPECTRUM] = _most_waves(job, ranks)
+        count = job.grid.nx // 2 + 1
+        rows, columns = shape_of(highest_waves(job), job.grid.points, slice(0, -(-count // min(ranks, count))))
+        found[SPECTRUM] = rows * columns * np.dtype(np.complex128).itemsize
     return found
 
 
@@ -167,13 +169,6 @@ def _completed(scene: Scene) -> dict[str, Any]:
         scene.slab.tally.purpose = NAMES.get(name, name)
         memories[name] = part.at_rest()
     return memories
-
-
-def _most_waves(job: Job, ranks: int) -> int:
-    """Return the largest memory of a rank for the spectrum of the surface [bytes]."""
-    count = job.grid.nx // 2 + 1
-    rows, columns = shape_of(highest_waves(job), job.grid.points, slice(0, -(-count // min(ranks, count))))
-    return rows * columns * np.dtype(np.complex128).itemsize
 
 
 def free_bytes() -> int:
@@ -491,7 +486,7 @@ def _try(march: March, seconds: float) -> list[StageCost]:
                 if timeline.chooses and span.stage.chooses:  # the stage ends with this step, whatever its number
                     estimates[step.stage] = span.jumps + span.count
                     record = MadeStep(step.stage, span.stage.seconds, step.dt)
-                    rest = rest._replace(number=step.number, passed=0, decide=partial(_accept, record))
+                    rest = rest._replace(number=step.number, passed=0, decide=lambda *_, made=record: made)
                 march.advance(rest)
                 continue
             stage.steps -= step.passed
@@ -500,11 +495,6 @@ def _try(march: March, seconds: float) -> list[StageCost]:
         if timeline.chooses and span.stage.chooses:  # steps chosen so far, and an estimate of the others
             stage.steps = estimates.get(index, span.jumps + span.count)
     return stages
-
-
-def _accept(record: MadeStep, *_: float) -> MadeStep:
-    """Accept a step whatever its errors are."""
-    return record
 
 
 def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:

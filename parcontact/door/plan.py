@@ -159,7 +159,9 @@ class Planner:
         for part in parts:
             self.overhead = warm_up(part, slab)
             yield ""
-            yield from maps(part, self.ranks, measure_program(slab))
+            from ..files import run  # noqa: F401  # libraries and loops of a run count as memory of the program
+
+            yield from maps(part, self.ranks, int(slab.reduce((), [float(peak_memory())])[0]))
             yield ""
             yield from self._describe(part, slab, trials * len(parts))
 
@@ -231,14 +233,6 @@ def _work(job: Job) -> float:
     points = job.grid.nx * job.grid.ny
     steps = Timeline.from_job(job).count if job.history else len(request(job).points)
     return max(steps, 1) * points * math.log(points + 1)
-
-
-def measure_program(slab: Slab) -> int:
-    """Return the largest memory of a rank so far [bytes]; collective. Before large maps are made, this is the memory of
-    libraries and compiled loops."""
-    from ..files import run  # noqa: F401  # a run imports it
-
-    return int(slab.reduce((), [float(peak_memory())])[0])
 
 
 def peak_memory() -> int:

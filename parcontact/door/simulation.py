@@ -96,19 +96,6 @@ class Row(Mapping[str, float]):
     def __init__(self, numbers: Mapping[str, float]) -> None:
         self._numbers = dict(numbers)
 
-    @classmethod
-    def from_record(cls, row: recorder.StepRow, added: tuple[str, ...] = ()) -> Row:
-        """Return the row of a recorded step; `added` are the names of columns of effects."""
-        branches = len(row.branch_dissipation)
-        return cls(dict(zip(recorder.columns(branches, added), recorder.row_numbers(row, branches), strict=True)))
-
-    @classmethod
-    def from_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
-        """Return the row in a line of measures.csv; the number of branches follows from the length of the line."""
-        cells = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in line.split(",")]
-        branches = len(cells) - len(recorder.columns(0, added))
-        return cls(dict(zip(recorder.columns(branches, added), cells, strict=True)))
-
     def __getitem__(self, name: str) -> float:
         return self._numbers[name]
 
@@ -217,8 +204,11 @@ class Simulation:
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
-            return Row.from_line(saved.table.last, added)
-        return Row.from_record(march.row, added)
+            numbers = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in saved.table.last.split(",")]
+        else:
+            numbers = recorder.row_numbers(march.row, len(march.row.branch_dissipation))
+        names = recorder.columns(len(numbers) - len(recorder.columns(0, added)), added)
+        return Row(dict(zip(names, numbers, strict=True)))
 
     @property
     def finished(self) -> bool:

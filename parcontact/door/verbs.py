@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-if TYPE_CHECKING:
     Verb = Callable[[argparse.Namespace], int]
+    Shows = Callable[[Doubt], bool]  # whether a warning is shown
+    Act = Callable[[argparse.Namespace, Job, Slab, Shows], int]
 
 BLANK = " \0"  # characters that may follow the name of an MPI library
 LEAST_FILES, LEAST_MEMORY = 32, 520e6  # tuning: open files, and memory [bytes], that MPI needs to start
@@ -108,10 +109,6 @@ def root_alone(verb: Verb) -> Verb:
 
     return act
 
-
-if TYPE_CHECKING:
-    Shows = Callable[[Doubt], bool]  # whether a warning is shown
-    Act = Callable[[argparse.Namespace, Job, Slab, Shows], int]
 
 OF_A_CURVE = ("velocities", "pressures", "temperatures")
 
@@ -390,7 +387,8 @@ def surface(options: argparse.Namespace) -> int:
     alone = map_jobs.is_map(given)
     if options.start and not alone:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
-    map_jobs.refuse_taken(options.start)
+    if options.start and os.path.lexists(options.start):
+        raise InputError(f"--job: {options.start} already exists; give another name")
     job = map_jobs.load_map(given, options.set) if alone else _load(options)
     if job.bands is not None:
         raise InputError(f"{given} has bands, each with heights on a grid of its own: give it a grid instead (grid)")
@@ -479,7 +477,7 @@ def doctor(options: argparse.Namespace) -> int:
         if world.rank == 0:
             print(text, flush=True)
 
-    for line in door_doctor.describe_machine(world, Path.cwd()):
+    for line in door_doctor.describe_machine(world):
         show(line)
     results = [(check, run_check(check, Bench(world, options.precision))) for check in CHECKS]
     show("\n" + markdown(results))
