@@ -29,7 +29,7 @@ WIDTH = 76  # letters in a line of a comment
 OUTSIDE = ("frequencies", "temperatures")  # kinds of warnings for which a point is left out
 OUT_OF_RANGE = "outside of its measured range"
 BY_SHIFT = (
-    ", as reduced to the reference temperature: at these frequencies, or at temperatures whose shift reaches them",
+    ": at these frequencies, or at temperatures whose shift reaches them",
     ", or at several temperatures and give material.shift",
 )  # how to measure them with a shift, and without one
 
@@ -109,7 +109,7 @@ def _name_outside(outside: Mapping[Wanted, Doubt], count: int, given: float) -> 
         groups.setdefault((at, doubt.numbers.get("side")), []).append(point)
     if groups:
         yield f"left out: {len(outside)} of {count} points, at which the surface excites the rubber {OUT_OF_RANGE}"
-    ends: list[Any] = []
+    ends, reduced = list[Any](), "" if math.isnan(given) else " (reduced to the reference temperature)"
     for (at, side), points in sorted(groups.items(), key=str):
         speeds = [quantity(end.speed, "m/s") for end in (min(points), max(points))]
         who = f"{' to '.join(dict.fromkeys(speeds))}{at} ({len(points)} point{'s' * (len(points) > 1)})"
@@ -119,15 +119,16 @@ def _name_outside(outside: Mapping[Wanted, Doubt], count: int, given: float) -> 
             continue
         own = [each[end] for each in numbers for end in ("low", "high")]
         far = f"{max(each['decades'] for each in numbers):.1f} decades {side}"
-        measured = f"{first['first']:.3g} to {first['last']:.3g} Hz"
-        yield f"{who} needs moduli at {_range(own)} Hz, {far} the measured {measured}"
+        measured = _range([first["first"], first["last"]])
+        yield f"{who} needs moduli at {_range(own)}{reduced}, {far} the measured {measured}"
         ends += own
     if ends:
-        yield f"to keep these points, measure the moduli from {_range(ends)} Hz{BY_SHIFT[math.isnan(given)]}"
+        yield f"to keep these points, measure the moduli from {_range(ends)}{reduced}{BY_SHIFT[math.isnan(given)]}"
 
 
 def _range(values: Sequence[float]) -> str:
-    return " to ".join(dict.fromkeys(f"{end:.3g}" for end in (min(values), max(values))))
+    """Return a range of frequencies [Hz] as text."""
+    return " to ".join(dict.fromkeys(quantity(end, "Hz") for end in (min(values), max(values))))
 
 
 def _to_abaqus(table: ExportedTable) -> str:
