@@ -193,7 +193,7 @@ class _Table:
     lines: Sequence[int]
 
     def measurement(self, poisson: float) -> Measurement:
-        """Return the columns of the table as sets in SI units."""
+        """Return the table as a measurement: sets of shear moduli in SI units."""
         doubts = tuple(self._name_letter(2.0 * (1.0 + poisson)))
         derived = self._complete()
         letter, kind = self._find_moduli()

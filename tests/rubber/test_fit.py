@@ -31,7 +31,7 @@ history: [{pressure: 1.0e4, velocity: 1.0e6, distance: 1.0e-3, cells_per_step: 1
 
 
 def test_one_temperature_has_no_shift(tmp_path: Path, main: "Main") -> None:
-    """Nothing is fitted to it, and that is said; constants can be given."""
+    """No shift is fitted to a table of one temperature, and a message says so; constants may be given."""
     measured.write_sweeps(tmp_path / "one.csv", temperatures=(20.0,))
     _, out, _ = main("fit", "one.csv", "--shift", "wlf")
     assert "No shift: it takes several temperatures, or given constants, as --shift wlf:C1,C2." in out
