@@ -93,7 +93,7 @@ def rules_of(*checks: Callable[..., Iterator[Fault]]) -> tuple[Rule, ...]:
 
 
 class Instead(NamedTuple):
-    """What a message says instead of an unknown key: advice, and the keys that are probably meant."""
+    """Advice on an unknown key, with the keys that are probably meant by it."""
 
     advice: str
     keys: tuple[str, ...] = ()
