@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from parcontact.effects.relaxation import relaxation_of
+from parcontact.effects.branches import relaxation_of
 from parcontact.files import tables
 from parcontact.job import Job, load, load_cases
 from parcontact.physics.prony import complex_modulus

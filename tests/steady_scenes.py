@@ -7,7 +7,7 @@ from mpi4py import MPI
 from rubbers import complex_modulus
 
 from parcontact import job as jobs
-from parcontact.effects.relaxation import relaxation_of
+from parcontact.effects.branches import relaxation_of
 from parcontact.march import scene
 from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..job import Grid, Job
 from ..job.history import Step, Timeline
 from ..job.stages import GeometricStep, Stage

@@ -22,7 +22,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..contact.problem import InterfaceLaw
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..errors import RunError
 from ..files import outputs
 from ..files.recorder import StepRow

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..columns import BANDS, choose_columns, names_of
-from ..effects.relaxation import relaxation_of, temperature_of
+from ..effects.branches import relaxation_of, temperature_of
 from ..errors import Doubt, RunError, UnsolvedError
 from ..files import outputs
 from ..job import Job

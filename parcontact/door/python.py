@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..errors import Doubt, InputError, JobError, Kind, ParcontactWarning, RunError
 from ..files import wisdom
 from ..files.tables import Wanted

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..contact.problem import LOOSE, VERY_LOOSE
+from ..effects.branches import FoldedBranches, bounded_error, fold_branches, relaxation_of, time_factor_of, time_scales
 from ..effects.effect import EXTRAPOLATION, SINGLE, Decision, Effect, guarded
-from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
-from ..effects.relaxation import relaxation_of, time_factor_of
 from ..job import Grid, Job, Numerics, Output, Spectral, listing
 from ..job.history import Timeline, describe_steps
 from ..physics.motion import Shear
@@ -99,7 +98,7 @@ class Choices:
 
     @cached_property
     def folded(self) -> FoldedBranches:
-        """Which branches of the material have maps (`effects.folded_branches`)."""
+        """Which branches of the material have maps (`effects.branches`)."""
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
         reason = next(filter(None, (why(self.job) for why in self.job.asked("why_not_folded"))), reason)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..effects.relaxation import time_factor_of
+from ..effects.branches import time_factor_of
 from ..errors import Doubt, Kind
 from ..job import Job, Zener
 from ..job.meaning import excited_band

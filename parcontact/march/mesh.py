@@ -63,7 +63,7 @@ class Loaded(Protocol):
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     """Return a guess of the contact for each load and speed of a job, whose shortest wave is `wave` [m] and whose box
     has the `area` [m^2]. Slow sliding only occurs in friction curves."""
-    from ..effects.relaxation import relaxation_of
+    from ..effects.branches import relaxation_of
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
     waves, curve = math.sqrt(area) / wave, job.steady and not job.history

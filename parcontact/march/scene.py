@@ -17,8 +17,8 @@ from ..contact.problem import Box, Operators, Workspace
 from ..contact.solver import ContactSolver
 from ..contact.starts import LARGER_CELLS, SolverOnTiles
 from ..effects import effect
+from ..effects.branches import FoldedBranches, describe_folded_branches
 from ..effects.effect import TOLERANCES, ContactLaw, Effect, Memories
-from ..effects.folded_branches import FoldedBranches, describe_folded_branches
 from ..errors import InputError
 from ..job import Grid, Job
 from ..job.history import describe_steps

@@ -28,7 +28,7 @@ which the step began is still valid. A step of length 0 is a jump of the load, w
 relaxing branches (`branched` is None) may have a method `time_error(memory, trial, dt)`, which returns the relative
 error that the length of a step causes.
 
-Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless branches,
+Two kinds of branches have no map (`effects.branches` selects them and bounds the error): memoryless branches,
 for which `h_k = gain du + back du_before`, and frozen branches, which are springs `h_k = G_k u`.
 """
 

@@ -27,7 +27,7 @@ from .. import printed, streams
 from ..bands.band import Band
 from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
 from ..columns import TABLES
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..errors import InputError
 from ..files import files, hdf5, outputs, provenance
 from ..files.provenance import PROGRAM

@@ -14,8 +14,8 @@ from .. import job as jobs
 from ..bands.choice import cut_bands
 from ..capabilities import Table
 from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, values_of
+from ..effects.branches import relaxation_of, time_factor_of
 from ..effects.effect import BY_THEORY
-from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..files import files, outputs, tables
 from ..files.tables import Wanted

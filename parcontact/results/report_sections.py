@@ -25,7 +25,7 @@ from PIL import Image
 from .. import capabilities, printed, streams
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import STEADY, SWEEP, UNITS
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..errors import InputError
 from ..files import hdf5, outputs, tables
 from ..job import Job, listing, load

@@ -44,7 +44,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..columns import CYCLES, names_of, to_csv, values_of
-from ..effects.relaxation import relaxation_of
+from ..effects.branches import relaxation_of
 from ..files import files, outputs
 from ..job import Initial, Job, Ramp, Stage, Swing
 from ..job.listing import answers

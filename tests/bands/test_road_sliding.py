@@ -14,7 +14,7 @@ from parcontact.__main__ import main
 from parcontact.bands.band import Band, PressureLadder, Rung
 from parcontact.bands.choice import spectrum_of
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.effects.relaxation import relaxation_of
+from parcontact.effects.branches import relaxation_of
 from parcontact.errors import JobError, RunError
 from parcontact.files import tables
 from parcontact.march.scene import set_up

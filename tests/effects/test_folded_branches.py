@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from restarting import Bench
 from rubbers import complex_modulus
 
-from parcontact.effects.folded_branches import (
+from parcontact.effects.branches import (
     FoldedBranches,
     TimeScales,
     fold_branches,

@@ -141,7 +141,7 @@ def load(tmp_path: Path, material: str) -> jobs.Job:
 
 def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> None:
     """At any temperature: the file holds seven digits, also of C1 and C2, which are those of log a_T = 2."""
-    from parcontact.effects.relaxation import relaxation_of
+    from parcontact.effects.branches import relaxation_of
 
     path = measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
     (tmp_path / "materials").mkdir()
@@ -296,7 +296,7 @@ def test_moduli_with_a_law_of_their_own(tmp_path: Path, law: str) -> None:
 def test_a_job_at_another_temperature(tmp_path: Path) -> None:
     """Moduli of the file are b_T times those at the reference, also those that checks use; a table in a job gives the
     same body."""
-    from parcontact.effects.relaxation import relaxation_of
+    from parcontact.effects.branches import relaxation_of
 
     made = compound.fitted(sweeps(tmp_path / "table.txt", "density"), 0.5, 20.0, "wlf", 0.05)
     (tmp_path / "rubber.yaml").write_text(made.text())

@@ -26,8 +26,8 @@ from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Rough
 from ...job.yaml_text import Fault
 from ...physics.prony import Array, Moduli, Prony, Zero, complex_modulus, normal_form, retardation
+from ..branches import relaxation_of
 from ..effect import Decision, Effect
-from ..relaxation import relaxation_of
 
 
 def pair(first: Moduli, second: Moduli) -> Prony:

@@ -33,7 +33,7 @@ from ...march.point import Point
 from ...march.scene import Setup
 from ...parallel.slab import Array
 from ...physics.convolution import travelling_wavenumbers, wavenumbers
-from ..relaxation import highest_temperature_of
+from ..branches import highest_temperature_of
 from .effect import feeds_back
 from .solver import Conductor, Flash, depths_of
 from .steady import Vector, beyond_shift, no_material

@@ -23,8 +23,8 @@ from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
 from ...physics.prony import Exponentials, Prony, fit_exponentials
 from ...physics.records import Entry, Saved, Units
+from ..branches import factor_at, temperature_of
 from ..effect import Changes, Decision, Effect, Instant
-from ..relaxation import factor_at, temperature_of
 from . import ERROR
 from .solver import Conductor, Depths, Heating, HeatMemory, depths_of
 

@@ -19,7 +19,7 @@ from ...march.point import Point
 from ...march.scene import Setup
 from ...parallel.slab import Array
 from ...physics.records import Measures
-from ..relaxation import highest_temperature_of, temperature_of
+from ..branches import highest_temperature_of, temperature_of
 from .effect import Thermal, feeds_back
 from .solver import Flash, depths_of, flash_of, share_of, sliding_heat, sliding_heat_unbounded, spread_over
 

@@ -17,8 +17,8 @@ from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
 from ...physics.motion import InterfaceFriction
 from ...physics.records import Measures, Memory
+from ..branches import time_factor_of
 from ..effect import Changes, Decision, Effect, Instant
-from ..relaxation import time_factor_of
 
 SAME = 1e-9  # rounding: tolerance on Poisson's ratio
 LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal

@@ -35,7 +35,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,8 @@ from ...contact.preconditioner import ExtendedPreconditioner, cell_levels, lengt
 from ...contact.problem import Operator
 from ...parallel.slab import Array, Slab
 from ...physics.halfspace import Response, Vector
-from .section import Base
 
+Base = Literal["bonded", "smooth"]
 THICK = 22.0  # accuracy: x above which S(x) - 1 is below rounding
 FAR = 50.0  # accuracy: distance over thickness beyond which displacements are below rounding
 KNOTS_PER_THICKNESS = 16  # accuracy: knots of the spline through the correction; its error is below 1e-6

@@ -1,18 +1,121 @@
-"""The effect of softening: its section and its decision. It acts only in steady sliding (`steady`)."""
+"""Softening of filled rubber by strain: the section `softening`, with factors of both moduli, and the effect.
+
+The effect acts only in steady sliding (`steady`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import AfterValidator, Field, PrivateAttr
 
-from ...job.parts import Part, Rule
+from ...errors import InputError
+from ...job.parts import Part, Positive, Rule, existing_file, rules_of
+from ...job.yaml_text import Fault, refuse
 from ...parallel.slab import Array
 from ...printed import quantity
 from ..effect import BY_THEORY, Decision, Effect
-from .section import RULES, Softening
-from .strain_table import octave_of, strains_in_full_contact
+from .strain_table import StrainTable, octave_of, read_sweep, strains_in_full_contact
+
+Row = tuple[Positive, Positive, Positive]
+LEAST_POISSON = 0.45  # physics: Poisson's ratio from which the strain of an incompressible body holds to 10 %
+
+
+def _rising(table: tuple[Any, ...] | None) -> Iterator[Fault]:
+    if table is None or any(row is None or None in row for row in table):
+        return
+    strains = [row[0] for row in table]
+    if len(strains) < 2 or any(b <= a for a, b in pairwise(strains)):
+        yield Fault("must be at least two rows [strain, f, g] with rising strains [-]", ("table",))
+
+
+def _of_a_file(path: Path | None, reference: float | None) -> Iterator[Fault]:
+    if path is None and reference is not None:
+        yield Fault(
+            "is for the path of a strain sweep; factors of a table are given as they are", ("reference_strain",)
+        )
+
+
+class Softening(Part):
+    """Section with factors of the storage and the loss modulus as functions of the shear strain amplitude."""
+
+    label: ClassVar[str] = "softening"
+    table: tuple[Row, ...] | None = Field(
+        default=None, description="a list of rows [strain, f, g], factors of G' and G''"
+    )
+    path: Annotated[Path, AfterValidator(existing_file)] | None = Field(
+        default=None, description="the path of a strain sweep with the columns strain, f, g or strain and moduli"
+    )
+    reference_strain: Positive | None = Field(default=None, description="a positive strain [-] of the sweep")
+
+    one_of = (("table", "path"),)
+    rules = (*rules_of(_rising), Rule(("path", "reference_strain"), _of_a_file))
+
+    _made: tuple[StrainTable, str] = PrivateAttr()
+
+    def model_post_init(self, context: Any) -> None:
+        if self.table is not None:
+            self._made = StrainTable(*zip(*self.table, strict=True)), ""
+            return
+        if self.path is None:
+            return  # `one_of` reports it
+        try:
+            self._made = read_sweep(self.path, self.reference_strain)
+        except InputError as error:
+            refuse(Fault(f"cannot be read: {error}", ("path",)))
+
+    @property
+    def made(self) -> StrainTable:
+        """Table of the factors of the moduli as functions of the strain."""
+        return self._made[0]
+
+    @property
+    def fact(self) -> str:
+        """Return a sentence on the strain at which the factors are 1; '' if the job gives the factors."""
+        return self._made[1]
+
+
+def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
+    """Yield an error for jobs with a history: `f G' + i g G''` is no Prony series, so that it has no memory in time."""
+    if softening is None:
+        return
+    if history:
+        sentence = (
+            "cannot be used with softening, which is for friction curves (parcontact steady): softened moduli are no"
+        )
+        yield Fault(f"{sentence} Prony series; leave out the history and give steady.pressures", ("history",))
+    if initial.state == "steady":
+        yield Fault("cannot be used with softening, as softened moduli are no Prony series", ("initial",))
+
+
+def in_a_periodic_box(softening: Softening | None, grid: Any) -> Iterator[Fault]:
+    """Yield an error for free boxes, for whose waves the strain is not known."""
+    if softening is not None and not all(grid.cyclic):
+        yield Fault(
+            "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")
+        )
+
+
+def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
+    """Yield an error for bodies that dissipate nothing or are compressible."""
+    if softening is None:
+        return
+    if not material.fitted.branches:
+        yield Fault(
+            "needs a material that relaxes (model zener or dma): strains count where it dissipates", ("softening",)
+        )
+    if material.poisson < LEAST_POISSON:
+        sentence = (
+            f"must be at least {LEAST_POISSON:g} with softening, whose strains are those of an incompressible body"
+        )
+        yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
+
+
+RULES = rules_of(only_in_steady_sliding, in_a_periodic_box, of_rubber)
 
 
 class SofteningEffect(Effect[None]):

@@ -11,8 +11,8 @@ import yaml
 from conftest import WORLD
 from marched_jobs import column, marched
 
+from parcontact.effects.branches import relaxation_of
 from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
-from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
 from parcontact.files.provenance import references_of
 from parcontact.job import Job, load
