@@ -69,6 +69,10 @@ class Box:
         """Return a map that is not 0 where p is above its lower bound, which includes points that yield."""
         return p if self.lowest == 0.0 else p > self.lowest
 
+    def admits(self, mean: float) -> bool:
+        """Return True if pressures within the bounds can have this mean."""
+        return self.lowest * (1.0 - LOAD_ROUNDING) <= mean <= self.highest * (1.0 + LOAD_ROUNDING)
+
     def project(self, p: Array) -> None:
         """Limit p to the bounds."""
         np.clip(p, self.lowest, self.highest, out=p)

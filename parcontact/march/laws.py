@@ -28,7 +28,7 @@ import numpy as np
 
 from ..contact import starts
 from ..contact.certificate import Judge
-from ..contact.problem import Constraint, Contact, Control, MeanPressure, Problem, reachable_certificate
+from ..contact.problem import Box, Constraint, Contact, Control, MeanPressure, Problem, reachable_certificate
 from ..contact.splitting import Splitting
 from ..effects.effect import ContactLaw, Detached, EdgeMotion, PreviousContacts, PreviousPressure, SolvedContact
 from ..errors import InputError, RunError
@@ -102,6 +102,13 @@ def of_solve(
         text = f"{what}; {numerics.precision} precision reaches only about {reach:.1g} here: {change}"
         return StepError(text, beyond_precision=True)
     return StepError(f"{what}; {', or '.join(_changes(scene, step, failed, last, moved)) or FINITE}")
+
+
+def _out_of_bounds(scene: Scene, step: Step, box: Box, mean: float, unit: float) -> StepError:
+    """Return the error for a mean pressure outside the bounds; `unit` is the unit of both [Pa]."""
+    bound, which = (box.lowest, "least") if mean < box.lowest else (box.highest, "most")
+    text = f"pressures of at {which} {bound * unit:.4g} Pa cannot have the mean {mean * unit:.4g} Pa"
+    return StepError(f"{describe_place(scene, step)}: {text}; change the load, or the bound on pressures")
 
 
 def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: float) -> Iterator[str]:
@@ -200,6 +207,8 @@ class DryLaw:
         scene, contact, remark = self.scene, None, ""
         most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
         problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
+        if isinstance(control, MeanPressure) and not problem.constraint.admits(control.value):
+            raise _out_of_bounds(scene, step, problem.constraint, control.value, trial.alpha * scene.units.pressure)
         make_start(scene, past.pressures, step, trial.alpha, past.spare)
         if past.last.alpha == 0.0:  # nothing has been solved before
             on = partial(solver_on, scene.setup)

@@ -21,7 +21,7 @@ from ..contact.preconditioner import grids_for
 from ..contact.problem import Box, Contact, reachable_certificate
 from ..contact.projected import FreeSteadySolver
 from ..contact.splitting import SteadySolver
-from ..errors import Doubt, UnsolvedError
+from ..errors import Doubt, InputError, UnsolvedError
 from ..files.checkpoint import Contents
 from ..job import Job
 from ..job.listing import answers
@@ -63,10 +63,15 @@ class SteadySliding:
     """Solver of the steady states of one job's surface and body; the constructor and the methods are collective.
 
     Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on
-    certificates follows from the tolerance of the job and is at most `most`.
+    certificates follows from the tolerance of the job and is at most `most`. Raises InputError for a body with a memory
+    that has no branches.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
+        body = setup.job.material.fitted
+        if body.remembers and not body.branches:
+            knows = "steady sliding knows a body by its moduli at each frequency, and this body gives none"
+            raise InputError(f"material: {knows}; let a run slide at a constant velocity until friction has settled")
         self.setup = setup
         self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance, setup.half_space.free), most)
         self.probe = setup.probe()

@@ -17,6 +17,7 @@ from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.job.materials import Elastic
 from parcontact.march import scene
+from parcontact.march.curve import on_one_grid
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import BodyMemory, Trial, ZenerBody
 from parcontact.physics.prony import Prony
@@ -116,3 +117,9 @@ def test_its_rest_is_not_cut_short(use: Callable[[type[OwnBody]], None]) -> None
     _, rows = marched(job({**REST, "time_step": {"first": TIME / 10, "growth": 1.5}}))
     assert len(rows) > 6
     assert column(rows, "contact_area")[-1] > column(rows, "contact_area")[2]
+
+
+def test_steady_sliding_refuses_it() -> None:
+    """It has no complex modulus, and would be taken for elastic."""
+    with pytest.raises(InputError, match="material: steady sliding knows a body by its moduli"):
+        on_one_grid(job(REST), Slab.alone(32, 32))

@@ -19,6 +19,7 @@ import parcontact as pc
 from parcontact.door import manual_texts
 from parcontact.effects import effect
 from parcontact.effects.leakage.over_time import Gaps
+from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.results import maps
 
@@ -112,3 +113,12 @@ def test_a_start_from_the_fluid_alone(with_fluid: Any) -> None:
     with_fluid()
     rows = list(pc.Simulation(job).steps())
     assert rows[-1].pressure == pytest.approx(FLUID + 2 * LOAD, rel=1e-6)
+
+
+def test_a_load_below_that_of_the_fluid_is_refused(with_fluid: Any) -> None:
+    """It says both numbers; pressures of at least q cannot have a smaller mean."""
+    with_fluid()
+    with pytest.raises(
+        RunError, match=r"pressures of at least 4e\+04 Pa cannot have the mean 3e\+04 Pa; change the load"
+    ):
+        marched(job(0.75 * FLUID))
