@@ -1,12 +1,12 @@
 """Capabilities: each folder of `effects/` adds one to the program, and a deleted folder removes it.
 
 The package of a folder may state `SECTION`, the section of a job that turns it on, `EFFECT`, the name of its class in
-`effect.py`, and columns of tables (`Column`, found by `stated`). Other folders of the program find what its further
-modules contain by `offers`, and so name no capability. `GIVES` and `USES` name quantities of a step that an effect
-computes for other effects, and that it needs from them: effects that give something act before those that use it. With
-`MATERIAL = True` the section is a material, which may include a file; with `IN_SCENE = True` all jobs of a directory
-have the same section.
-`CHANGES_STEPS` names the keys that change steps which a run has completed, if these are not all keys of the section.
+`effect.py`, and columns of tables (`Column`, found by `stated`). Other rooms of the program call `offers` to find
+objects in the other modules of the folder, such as `results.py`, and so name no capability. `GIVES` and `USES` name
+quantities of a step that an effect computes for other effects, and that it needs from them: effects that give something
+act before those that use it. `MATERIAL = True` says that the section is a material, which may include a file, and
+`IN_SCENE = True` that all jobs of a directory must have the same section. A run cannot continue with other values of
+keys that change its completed steps. These are all keys of the section, or the keys that `CHANGES_STEPS` names.
 `STAGE_KEYS` are the keys that a section adds to stages.
 """
 
@@ -26,7 +26,8 @@ ROOM = f"{__package__}.effects"
 class Column:
     """A column of a table: its name, SI unit (`""` if dimensionless), and meaning as printed in the manual.
 
-    `of` returns the value from a row (default: the attribute `name`); `when` is the section or option it requires.
+    `of` returns the value from a row; by default it is the attribute with the name of the column. `when` is the section
+    or option of the job without which a table lacks the column.
     """
 
     name: str
@@ -53,13 +54,14 @@ def folders() -> tuple[ModuleType, ...]:
 
 
 def needs_of(thing: Any) -> tuple[Collection[str], Collection[str]]:
-    """Return the names of what a capability gives to others, and of what it uses from others."""
+    """Return two lists of names of quantities of a step, `GIVES` and `USES`: those that a capability (its package, or
+    its effect's class) gives to others, and those that it uses from others."""
     return getattr(thing, "GIVES", ()), getattr(thing, "USES", ())
 
 
 def in_order(needs: Mapping[str, tuple[Collection[str], Collection[str]]]) -> list[str]:
-    """Return names in alphabetical order, except that a name which uses something comes after the name that gives it.
-    `needs` has what each name gives and uses."""
+    """Return the names of capabilities in alphabetical order, except that a capability that uses something comes after
+    the one that gives it. `needs` has what each capability gives and uses (`needs_of`)."""
     order, left = list[str](), sorted(needs)
     while left:
         given = {one: set(needs[one][0]) for one in left}

@@ -1,6 +1,6 @@
 """Columns of all tables that are written (name, SI unit, meaning, value in a row), and their files.
 
-The names of columns in users' tables of moduli, shift factors, spectra and heights are here, too, with their spellings.
+The spellings of columns in users' tables of moduli, shift factors, spectra and heights are also here.
 
 Tables are the csv files, the rows of a run in Python, and the maps in `fields.h5`. The lists of columns on the manual's
 page `outputs` are generated from here. A column with `when` exists only if the job has that section or option.
@@ -45,7 +45,8 @@ SHIFT = re.compile(r"(?:log(?:_?10)?|lg)[\s_(]*([ab])_?t\)?")  # log_aT, log10(a
 
 
 class MeasuredColumn(NamedTuple):
-    """A name of NAMES, or another text, and a unit; None if the header cell has no unit."""
+    """The name of a column in the table of a user, one of NAMES or another text, and its `unit`, None if the header has
+    none."""
 
     name: str
     unit: str | None
@@ -78,7 +79,8 @@ def plain_unit(unit: str) -> str:
 
 
 def find_name(text: str) -> str:
-    """Return the name of NAMES that a header text means, by a word, a symbol, or both; '' if there is none."""
+    """Return the one of NAMES that a text of a header stands for, such as E_stor for `E'`, `Storage modulus`, or both;
+    '' if there is none."""
     text = re.sub(r"\s+", " ", text.strip(" ,:")).replace("″", "''").replace("′", "'").replace("’", "'")
     if text in NAMES or (name := _symbol(text)):
         return text if text in NAMES else name
@@ -106,7 +108,8 @@ PER_BRANCH = "dissipated_K"  # replaced by a column for each branch K = 0, 1, ..
 
 
 def choose_columns(table: Table, branches: int = 0, when: Collection[str] = ()) -> list[Column]:
-    """Return the columns of a table for a material of `branches` branches and a job with the sections `when`."""
+    """Return the columns of a table for a job with the sections and options `when`; `branches` is the number of
+    branches of its material."""
     chosen = list[Column]()
     for column in table:
         if column.name == PER_BRANCH:

@@ -1,6 +1,6 @@
 """Decorators that compile loops over rows and functions of points, by numba.
 
-Sums may be reordered to use vector units; NaN and infinity keep their meaning. Machine code is kept in a private
+Sums may be reordered for SIMD instructions; NaN and infinity keep their meaning. Machine code is kept in a private
 directory, so that only the first run waits for the compiler; without such a directory every run compiles.
 
 Plans of transforms are kept in such a directory, too. Its files are executed or trusted unread, so that no other user
@@ -38,12 +38,12 @@ def loop(function: Function) -> Function:
 
 
 def pointwise(function: Function) -> Function:
-    """Compile a function of numbers to act on all points of arrays."""
+    """Compile a function of numbers to a function of arrays, which acts on each point."""
     return cast(Function, _compiled(lambda kept: numba.vectorize(cache=kept)(function)))
 
 
 def cache_path(compiled: Any) -> Path | None:
-    """Return the directory that stores the machine code of a compiled function, or None."""
+    """Return the directory in which the machine code of a compiled function is kept; None if it is not kept."""
     kept = _cache_of(compiled)
     return Path(kept.cache_path) if kept and kept.cache_path else None
 
@@ -176,7 +176,8 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def directory(name: str) -> Path | None:
-    """Return the program's directory `name` in the user's cache directory, created if missing; None if unsafe."""
+    """Return the program's directory `name` in the user's cache directory, created if missing; None if other users
+    could write there."""
     with suppress(OSError, RuntimeError):
         home = Path.home()
         given = Path(os.environ.get("XDG_CACHE_HOME") or "")

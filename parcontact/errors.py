@@ -1,7 +1,7 @@
 """Errors that end the program with a sentence, and warnings as data (kind, place, numbers) with their sentences.
 
 Code that checks a job, a surface or a contact returns warnings as `Doubt` objects. Each `Kind` of warning is defined
-next to its test. No code compares or parses the sentences.
+next to the code that checks for it. No code compares or parses the sentences.
 """
 
 import math
@@ -16,7 +16,7 @@ DONE, FAILED, BAD_INPUT, STOPPED_EARLY = range(4)  # exit codes; stopped early: 
 
 
 class InputError(Exception):
-    """Bad input, described in one sentence: the program ends with exit code 2 and writes nothing."""
+    """Bad input, described in one sentence. The command line writes nothing and ends with exit code 2."""
 
 
 class JobError(InputError):
@@ -35,7 +35,7 @@ class InUseError(InputError):
 
 
 class RunError(Exception):
-    """A run that cannot continue, described in one sentence: exit code 1."""
+    """A run that cannot continue, described in one sentence. The command line ends with exit code 1."""
 
 
 class UnsolvedError(RunError):
@@ -54,8 +54,8 @@ NO_NUMBERS: Mapping[str, object] = {}
 
 @dataclass(frozen=True)
 class Doubt:
-    """A warning: its `kind`, its `place` (such as a key of the job), and its `sentence` with the numbers (SI units) and
-    names in it."""
+    """A warning: its `kind`, its `place` (such as a key of the job), and its `sentence`, with places for the `numbers`
+    (SI units) and names."""
 
     kind: str
     place: str
@@ -92,8 +92,8 @@ class ParcontactWarning(UserWarning):
     """A warning about a job or its results.
 
     `kind` names the problem, `place` the key of the job or `""`, and `numbers` has the values of the sentence in SI
-    units. Python's filters treat two warnings that differ in these numbers alone as the same: a line that calls this
-    package many times shows each problem once.
+    units. For Python's filters two warnings are the same if they differ only in `numbers`: if a line of a script calls
+    this package many times, each problem is shown once.
     """
 
     def __init__(self, doubt: Doubt) -> None:

@@ -16,7 +16,7 @@ MOST_DIGITS = 6  # limit on the digits of a number with an error
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
     """Return the unit with the prefix that suits the largest value, and the size of this prefixed unit in `unit`.
 
-    Prefixes of m² change by factors of a million, and values down to a thousandth keep the larger unit. °C, m³ and
+    Prefixes of m² change by factors of a million; values down to a thousandth of a unit are in this unit. °C, m³ and
     dimensionless values have no prefix. Times of two minutes or more are in minutes, hours, days or years.
     """
     if unit == "s" and abs(largest) >= LONG_TIME * TIMES["min"]:
@@ -39,12 +39,12 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def rounded_up(value: float, digits: int = 3) -> str:
-    """Return a number rounded up to few digits, for advice on a least value."""
+    """Return a number rounded up to `digits` digits, for advice on a least value."""
     return _round_towards(value, digits, 1)
 
 
 def rounded_down(value: float, digits: int = 3) -> str:
-    """Return a number rounded down to few digits, for advice on a largest value."""
+    """Return a number rounded down to `digits` digits, for advice on a largest value."""
     return _round_towards(value, digits, -1)
 
 
@@ -89,7 +89,7 @@ def stated_error(error: float, digits: int = 2) -> str:
 def with_error(value: float, error: float) -> str:
     """Return a number and its error with two digits of the error: 0.01483 ± 0.00036.
 
-    The number has four digits if no error is known, and at most MOST_DIGITS.
+    The number has at most MOST_DIGITS digits, and four if no error is known.
     """
     if not 0.0 < error < math.inf:
         return f"{value:.4g}"

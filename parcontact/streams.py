@@ -1,8 +1,4 @@
-"""Output that never fails, and bars of progress.
-
-* Output streams that never fail: printing must not end the program.
-* Progress bars with the time left, on terminals only.
-"""
+"""Output streams that never fail, as printing must not end the program, and bars of progress on terminals."""
 
 import io
 import os
@@ -17,14 +13,16 @@ CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u20
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters, and characters that reverse lines, replaced by their codes."""
+    """Return the text with control characters, and characters that reverse the direction of text, replaced by their
+    codes."""
     return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}" if ord(found[0]) > 255 else repr(found[0])[1:-1], text)
 
 
 class TolerantStream(io.TextIOBase):
-    """A stream that writes to another stream, and drops text if this one is closed or full, or lacks characters.
+    """A stream that writes to another stream. It drops text if the other stream is closed or full, and replaces
+    characters that the other stream cannot encode.
 
-    If `plain`, control characters except tabs and ends of lines are replaced; a progress bar needs them.
+    If `plain` is True, control characters except tabs and ends of lines are replaced, too; a progress bar needs them.
     """
 
     def __init__(self, stream: TextIO | None, plain: bool) -> None:

@@ -4,9 +4,9 @@ Numbers are separated by semicolons, tabs, commas or blanks, with decimal points
 semicolons, tabs or blanks. A mark at the end of every row, or at its beginning, is no cell. Words such as No Data,
 --- and #N/A, and empty cells, are missing numbers (NaN). Lines that begin with #, % or // are comments.
 
-The names of columns are in the last line above the numbers that has enough of them, also in a comment: with units in
-brackets, `Frequency (Hz)`, `f[Hz]`, or behind a slash, `E'/MPa`, or in a row of their own below the names. A long name
-and a symbol may stand together: `Storage Modulus E' (MPa)`. Lines of a laboratory may stand above.
+The header is the last line above the numbers, or a comment, that has enough names of columns. Units are in brackets,
+`Frequency (Hz)`, `f[Hz]`, behind a slash, `E'/MPa`, or in a row of their own below the names. A long name and a symbol
+may stand together: `Storage Modulus E' (MPa)`. Other lines, such as the name of the laboratory, may stand above it.
 
 Files .npy that users give are read, too; heights out of range and damaged files raise InputError.
 """
@@ -167,7 +167,7 @@ def number_rows(path: Path, lines: Iterable[str]) -> tuple[list[str], Iterator[t
     """Return the lines above the first row of numbers, and each row with the number of its line.
 
     Blank lines and comments between rows are passed over. If the first LONGEST_HEAD lines have no row, no rows are
-    returned. Rows raise InputError for a text that is not a number.
+    returned. The iterator of rows raises InputError for a text that is not a number.
     """
     numbered = enumerate(lines, start=1)
     start = list(islice(numbered, LONGEST_HEAD))
@@ -204,7 +204,7 @@ class Table:
     lines: list[int]
 
     def unit(self, name: str, known: dict[str, float]) -> float:
-        """Return the size of the unit of a column in SI. Raises InputError if the unit is not one of `known`."""
+        """Return `unit_size` of a column of this table."""
         return unit_size(self.path, name, self.units[name], known)
 
 
@@ -225,8 +225,9 @@ def read_named_columns(
 ) -> Table:
     """Return the columns of a table whose columns have names.
 
-    Columns with a name of `names` must hold numbers, and others are ignored. `enough(names)` returns True if the names
-    in a line make it a header. Columns with a name of `plain` need no unit. Raises InputError with file and line.
+    Columns with a name in `names` must hold numbers, and others are ignored. `enough` gets the names in a line, and
+    returns True if they make it a header. Columns with a name in `plain` need no unit. Raises InputError with file and
+    line; its message says that a file of the kind `expected`, with a header such as `example`, was expected.
     """
     lines = _read_lines(path, expected)
     rows = [(number, text) for number, text in lines if COMMENT.sub("", text).strip(" \t,;")]

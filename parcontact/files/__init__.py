@@ -1,1 +1,1 @@
-"""Output directories and the runs that fill them."""
+"""This room has the output directories, and the runs of jobs that write their results into them."""

@@ -1,14 +1,15 @@
-"""Checkpoints, which hold the complete state of a run at one instant, and height files that jobs need to start again.
+"""Checkpoints, which hold the complete state of a run at one instant, and files of heights that were given in Python.
 
 A checkpoint is an HDF5 file with checksums. Maps are global datasets `part/name` of shape (ny, nx), so that any number
 of ranks can read them; numbers are small datasets. Both are in the units of the run, which are powers of two:
 multiplied by the attribute `unit` they are in SI.
 
-Each row of a map has its CRC-32 in the group `checksums`. All bytes outside of maps are covered by a checksum in the
-seal, a text in front of the HDF5 data (the user block of the file) that is written last. Damaged files are recognised
-before HDF5, which may crash on them, opens them. The file has a temporary name until it is complete.
+Each row of a map has its CRC-32 in the group `checksums`. The seal is a text in front of the HDF5 data (the user block
+of the file), which is written last. It has the checksum of all bytes outside of maps. HDF5 may crash on a damaged file,
+so that the seal is checked before HDF5 opens the file. The file has a temporary name until it is complete.
 
-Heights that were given in Python are stored as files in the directories of jobs and checkpoints.
+Heights that were given as an array in Python are stored as a file next to the job or the checkpoint. A run that
+continues from the checkpoint reads this file.
 """
 
 import json
@@ -40,7 +41,7 @@ SUMS = "checksums"
 
 @dataclass(frozen=True)
 class TableMark:
-    """State of measures.csv: number of rows, and the last row."""
+    """State of measures.csv: the number of its rows, and the text of the last row."""
 
     rows: int = 0
     last: str = ""
@@ -48,8 +49,11 @@ class TableMark:
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of an undamaged checkpoint: `numbers` and their `units` by name; types of maps, and checksums of their
-    rows."""
+    """Contents of an undamaged checkpoint except its maps.
+
+    `numbers` has the small datasets by name, `units` the units of all datasets [SI]. `maps` has the types of the maps
+    by name, `sums` the checksums of their rows, and `shape` is (ny, nx).
+    """
 
     path: Path
     step: int
@@ -137,7 +141,8 @@ def row_sums(rows: Array) -> NDArray[np.uint32]:
 
 
 def inspect(path: Path) -> Contents:
-    """Return the contents of a checkpoint without maps, which `verify` checks; raises InputError for a damaged file."""
+    """Return the contents of a checkpoint except its maps, which are checked by `verify`; raises InputError for a
+    damaged file."""
     try:
         if problem := _broken(path):
             raise InputError(f"{path} {problem}")
@@ -148,7 +153,7 @@ def inspect(path: Path) -> Contents:
 
 
 def is_one(path: Path) -> bool:
-    """Return True if a file has the title of a checkpoint; raises OSError."""
+    """Return True if a file begins like a checkpoint; raises OSError."""
     with path.open("rb") as file:
         return file.read(len(TITLE)) == TITLE.encode()
 
@@ -239,7 +244,7 @@ def verify(contents: Contents, slab: Slab) -> str:
 
 
 def read_maps(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
-    """Read the maps of a checkpoint into the maps of `entries`, in their units; collective."""
+    """Read the maps of a checkpoint into the maps of `entries`, in the units of the entries; collective."""
     maps = _maps(entries)
     hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():
@@ -267,10 +272,10 @@ def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
 
 
 def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str, Any]:
-    """Return a stored job with the paths of its height files, in the directory of the checkpoint or its parent; root
-    only.
+    """Return a stored job with absolute paths of its files of heights; root only.
 
-    Raises InputError for a missing file, unless `elsewhere` is True: the file may be in another place.
+    These files are in the directory of the checkpoint, or in the parent of this directory. Raises InputError for a
+    missing file, unless `elsewhere` is True, which means that the file may be in another place.
     """
     for index, shape in enumerate(job["surface"]):
         name = Path(shape.get("path", "/"))

@@ -47,7 +47,7 @@ class Directory:
 
     @property
     def claim(self) -> Claim | None:
-        """Return the record of this command in the directory on root, None on other ranks."""
+        """Return, on root, the record of this command in the marker of the directory; None on other ranks."""
         return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:
@@ -56,7 +56,8 @@ class Directory:
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """Lock the directory within the context; collective. A new directory that stays empty is removed."""
+        """Lock the directory within the context, and create it if it is missing; collective. A created directory that
+        is still empty at the end is removed."""
         try:
             self._on_root(self._lock_and_read)
             yield
@@ -107,8 +108,10 @@ class Directory:
         self._on_root(act)
 
     def clear(self) -> None:
-        """Remove files of earlier runs of this command; collective. Call it after `make`, which renames foreign
-        files."""
+        """Remove files of earlier runs of this command; collective.
+
+        Call this after `make`, which renames foreign files: files with the names of results are removed here.
+        """
 
         def act() -> None:
             checkpoints = (path for _, path in self.saved())
@@ -136,7 +139,8 @@ class Directory:
                 path.unlink()
 
     def note(self, **facts: Any) -> None:
-        """Update this command's record in the marker file; root only. Errors of writing are ignored."""
+        """Set fields (`facts`) of this command's record (`outputs.Claim`) in the marker file; root only. Errors of
+        writing are ignored."""
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
@@ -229,8 +233,10 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a foreign directory has files of these names (except hidden and `PERMITTED` files), or
-    belongs to a sweep."""
+    """Raise InputError if a directory without a marker is that of a sweep, or if it has foreign files.
+
+    `names` are the names of its files. Hidden files and the files of `PERMITTED` are allowed.
+    """
     foreign = sorted(name for name in names if not name.startswith(".") and name not in PERMITTED)
     if cases := len([*(directory / CASES).glob(f"*/{outputs.MARKER}")]):
         raise InputError(
@@ -248,7 +254,8 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
 
 
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
-    """Raise InputError if a record in the directory belongs to another scene than the job `data` (plain data)."""
+    """Raise InputError if a record in the directory is of a job whose sections `SCENE` differ from those of the job
+    `data` (plain data)."""
     for verb, claim in claims.items():
         if found := outputs.differences(claim.job, data, SCENE):
             raise InputError(

@@ -24,8 +24,11 @@ XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which 
 
 
 class SavedMaps:
-    """The maps in a file, and the coordinates `marks` of their places: instants of a run, which have `steps`, or points
-    of a curve. Raises ValueError if their numbers differ."""
+    """The maps in a file, and the coordinates `marks` of their places.
+
+    Places are the instants of a run, whose numbers are `steps`, or the points of a curve. Raises ValueError if datasets
+    have different numbers of places.
+    """
 
     def __init__(self, file: h5py.File) -> None:
         over_time = "t" in file
@@ -45,7 +48,7 @@ class SavedMaps:
 
     @property
     def times(self) -> Array:
-        """Times of the instants of a run [s], NaN if not saved."""
+        """Times of the instants of a run [s]; NaN for an instant without saved maps."""
         return self.marks["t"]
 
     @property
@@ -61,9 +64,9 @@ class SavedMaps:
 class GrowingMaps:
     """A file of maps of shape (place, y, x), laid out for all places before the first one is saved; collective.
 
-    Saving a place writes its maps and then its coordinates `axes`, which are NaN before, so a killed run leaves a
-    readable file. Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; units of the coordinates and of
-    the maps by the names of their data sets.
+    A place is saved by writing its maps, and then its coordinates, which are NaN before. So a killed run leaves a
+    readable file. Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; `axes` has the units of the
+    coordinates by name, `units` the units of the maps by the names of their datasets.
     """
 
     def __init__(
@@ -79,10 +82,11 @@ class GrowingMaps:
     def replace_file(
         self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: list[int] | None = None
     ) -> None:
-        """Create a new file of a `kind` for `count` places, whose `steps` are data too; a run may have none yet.
+        """Create a new file for `count` places; collective.
 
-        Places of the present file `found` are copied: `kept` has their new and old indices. Maps that were not saved
-        are NaN.
+        `kind` is KIND or KIND_OF_STEADY_MAPS. `steps` are the numbers of the instants of a run, which may have none
+        yet; None for a curve. Places of the present file `found` are copied: `kept` has the old index of each new one.
+        Maps that were not saved are NaN.
         """
 
         def build(file: h5py.File) -> None:
@@ -119,8 +123,8 @@ class SteadyMaps(GrowingMaps):
     """Maps of the points of a friction curve; collective.
 
     Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; (velocity [m/s], mean pressure
-    [Pa], optionally temperature [deg C]) of all points. Points saved by an earlier part of the curve are kept; a file
-    with other maps is renamed. `lacking` are the indices of points without maps.
+    [Pa], optionally temperature [deg C]) of all points. Points that are saved in the file are kept; a file with other
+    maps is renamed. The attribute `lacking` has the indices of points without maps.
     """
 
     def __init__(
@@ -186,7 +190,7 @@ class FieldsFile(GrowingMaps):
         self._replace(None)
 
     def make_place(self, steps: Sequence[int]) -> None:
-        """Make space in the file for other future steps; saved maps are kept."""
+        """Replace the steps after which maps will be saved by `steps`; saved maps are kept."""
         found, _ = _found(self.path, self.slab)
         if found is not None:
             kept = found.reached(max(found.steps, default=0))
@@ -212,7 +216,7 @@ class FieldsFile(GrowingMaps):
         return problem
 
     def is_due(self, step: int) -> bool:
-        """Return True if the maps of the step from which a run continues are due but not saved."""
+        """Return True if maps of this step, from which a run continues, are due but not saved."""
         return step in self.steps and step not in self._kept
 
     def renew(self, provenance: Provenance) -> None:
@@ -252,7 +256,7 @@ class FieldsFile(GrowingMaps):
 
 
 def cut_back(path: Path, slab: Slab, step: int) -> str:
-    """Mark all instants after a step as not reached, in a file that is not continued; collective.
+    """Mark all instants after a step as not reached, in the file of a run that saves no more maps; collective.
 
     Returns a message about lost maps; raises InputError as `FieldsFile.resume`.
     """

@@ -25,7 +25,7 @@ def unused(path: Path) -> Path:
 
 
 def without_mark(path: Path) -> Path:
-    """Return the final name of a temporary file; other paths are unchanged."""
+    """Return the final name of a file with the temporary name that `unused` gives; other paths are unchanged."""
     return path.with_name(re.sub(r"\.[0-9a-f]{12}\.part$", "", path.name))
 
 
@@ -109,7 +109,7 @@ def replace_file(path: Path, text: str) -> None:
 
 
 def is_marked(path: Path) -> bool:
-    """Return True if a page or a picture was written by this program; raises OSError."""
+    """Return True if a page or a picture has the MARK of this program; raises OSError."""
     return MARK.encode() in path.read_bytes()
 
 
@@ -129,7 +129,7 @@ def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
 
 
 def put_aside(path: Path) -> Path | None:
-    """Rename a file to `NAME.aside`, or `NAME.aside-2` ...; returns the new name, or None without a file."""
+    """Rename a file to `NAME.aside`, or `NAME.aside-2` ...; returns the new path, or None if there is no file."""
     if not os.path.lexists(path):
         return None
     number, target = 1, path.with_name(f"{path.name}.aside")

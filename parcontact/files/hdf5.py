@@ -22,15 +22,8 @@ from .files import reason, without_mark
 
 T = TypeVar("T")
 MPI_IO = h5py.get_config().mpi  # else ranks act in turn
-FAILURES = (
-    OSError,
-    RuntimeError,
-    KeyError,
-    ValueError,
-    TypeError,
-    MemoryError,
-    OverflowError,
-)  # errors that h5py raises for damaged files
+# errors that h5py raises for damaged files
+FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
 MEND = "restore the whole file, or move it away to continue without its maps"
 FULL = 1 << 16  # tuning: free space below which a failure of MPI-IO means a full disk [bytes]
 DOUBLE = 8  # size of a number in a map [bytes]
@@ -38,7 +31,7 @@ RESERVE = 1 << 20  # tuning: space tested for data other than maps, as HDF5 cras
 
 
 class Slice(NamedTuple):
-    """This rank's rows of one map in a dataset `name`, below the leading indices `at`."""
+    """This rank's rows of the map that has the leading indices `at` in the dataset `name`."""
 
     name: str
     at: tuple[int, ...]
@@ -51,7 +44,7 @@ def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
 
 
 def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
-    """Read the rows of every rank into `part.rows`; collective."""
+    """Read the rows of every rank into `rows` of each of its `parts`; collective."""
     _move(path, slab, list(parts), False)
 
 
@@ -182,9 +175,10 @@ def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
-    """Create a new file on root by `build(file)`, after an empty `block` [bytes]; collective.
+    """Create a file on root and fill it by `build(file)`; collective.
 
-    All maps take `size` bytes. The free space on disk and the limit on file sizes are tested first.
+    The file begins with `block` empty bytes. All its maps together take `size` bytes, for which the free space on disk
+    and the limit on file sizes are tested first.
     """
 
     def make() -> None:
@@ -212,7 +206,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
 
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
-    """Write whole datasets that are not maps; root only."""
+    """Write existing small datasets by name; root only."""
     with h5py.File(path, "r", locking=False) as file:
         places = {name: file[name].id.get_offset() for name in values}
         types = {name: file[name].dtype for name in values}
@@ -231,7 +225,10 @@ def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], mar
 
 
 def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
-    """Set coordinates of instants or points (NaN: maps are not saved); collective."""
+    """Set coordinates by name for an instant or point, or for all that `index` selects; collective.
+
+    NaN marks places whose maps are not saved.
+    """
 
     def act() -> None:
         with h5py.File(path, "r", locking=False) as file:
@@ -269,7 +266,7 @@ def add_maps(
 ) -> None:
     """Add coordinates x and y [m] of a box of this `size`, and space for maps (n, y, x) with `units` by name.
 
-    `leading` are the existing coordinates along the first axis.
+    `leading` are the names of the existing coordinates along the first axis.
     """
     for axis, length, points in zip("xy", size, (slab.nx, slab.ny), strict=True):
         add_coordinate(file, axis, np.arange(points) * (length / points), "m")

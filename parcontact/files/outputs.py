@@ -1,4 +1,4 @@
-"""Files that each verb writes into an output directory: what it claims, copies and continues.
+"""Files that each verb writes into an output directory, and the marker by which they are recognised.
 
 The marker of a directory has a claim for each verb that wrote it, with its job and the id of its run. Only files that
 the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
@@ -25,12 +25,13 @@ SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a j
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files of one verb by name; '' and () for files that the verb does not have.
+    """Names of the files that one verb writes; '' or () if it writes no such files.
 
-    `words` call the results in messages. The `table` shows that there are results. Further files are tables, `maps`
-    (HDF5), a `log` and `others`. `copies` are the job as given, and with every default. A verb that saves `checkpoints`
-    continues from the newest, others from their table, if the sections and keys `same` of the job agree. `complete` is
-    a sentence on a finished table, with its last step or its number of points.
+    Messages call the results by `words`. If `table` exists, there are results. Further files are `tables`, `maps`
+    (HDF5), a `log` and `others`. `copies` are the job as given, and the job with every default. A verb with a directory
+    of `checkpoints` continues from the newest one, other verbs from their table; the sections and keys `same` of both
+    jobs must agree. `complete` is a sentence on a finished table; its {} stands for the last step or the number of
+    points.
     """
 
     words: str
@@ -111,8 +112,12 @@ SHOWN = 4  # most differences of two jobs in a message
 
 @dataclass(frozen=True)
 class Claim:
-    """Record of a command in an output directory: the `id` of its run, its job, and whether it `saved` a checkpoint;
-    the step and time (of a curve: the number of points) after which it `finished`; how surfaces `detached`."""
+    """Record of a command in an output directory.
+
+    `job` has the sections of its job, and `id` is the id of its run. `saved` is True after the first checkpoint.
+    `finished` is the last step and its time [s] (for a curve: the number of points and 0), None before the end.
+    `detached` is a sentence on how the surfaces detached, or ''.
+    """
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
@@ -144,7 +149,7 @@ def read_claims(directory: Path) -> dict[str, Claim]:
 
 
 def sound_claims(directory: Path) -> dict[str, Claim]:
-    """Return the records of commands in a directory; raises InputError for an unreadable marker."""
+    """Return what `read_claims` returns; raises InputError for an unreadable marker."""
     try:
         return read_claims(directory)
     except (OSError, ValueError) as error:

@@ -37,8 +37,10 @@ CHAIN_BYTES = 50_000  # tuning: largest text of a chain, an attribute of fixed s
 
 @dataclass(frozen=True)
 class Link:
-    """One run in a chain of restarts, or several identical runs in a row: the resolved job, and the step from which the
-    run continued."""
+    """One run in a chain of restarts: its resolved job, and the step from which it continued.
+
+    Several runs in a row with the same job, ranks and program are one link; `runs` is their number.
+    """
 
     job: str
     ranks: int
@@ -50,8 +52,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Provenance of a file: the chain of runs, the seeds of its roughness, its included file, the warnings about its
-    scene, the error budget so far (plain data), and the references to cite."""
+    """Provenance of a file of results: the `chain` of runs that wrote it; of the job the `seeds` of its roughness, a
+    sentence on its `included` file, and `warnings`; the error `budget` so far (plain data); `references` to cite."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
@@ -129,7 +131,7 @@ def cite_lines(job: dict[str, Any]) -> tuple[str, ...]:
 
 
 def references_of(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
-    """Return the references for a resolved job (plain data) and further `features`, each with its subject.
+    """Return pairs of a reference and its subject, for a resolved job (plain data) and further `features`.
 
     Raises KeyError or TypeError for an incomplete job.
     """

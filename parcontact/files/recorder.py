@@ -1,6 +1,6 @@
 """Rows and maps of a run while it goes on, in files and in a terminal.
 
-* measures.csv: a row per step and one for the initial state, written by root; its columns and units.
+* measures.csv: a row per step and one for the initial state, written by root; the columns of this table.
 * The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal.
 * The growing files of a run: run.log, measures.csv and fields.h5, begun or continued.
 """
@@ -37,10 +37,10 @@ from .tables import MEND, GrowingTable, whole_lines
 
 @dataclass(frozen=True)
 class StepRow:
-    """Record of one instant of a run, a row of measures.csv; SI units, energies [J] since the start.
+    """Record of one instant of a run, a row of measures.csv. Values are in SI units, energies since the start.
 
-    `errors` is the error budget of the instant, None without contact. `added` are the values of the columns of effects.
-    `remark` is a sentence for run.log about an unusual step, or ''.
+    `errors` is the error budget of the instant, None if nothing is in contact. `added` are the values of the columns of
+    effects. `remark` is a sentence for run.log about an unusual step, or ''.
     """
 
     step: int = 0
@@ -72,7 +72,8 @@ class StepRow:
 
     @property
     def error_gap(self) -> float:
-        """Return the estimated relative error of the mean gap: of the open share; NaN in full contact or if unknown."""
+        """Return the estimated relative error of the mean gap, which is that of the share of open area; NaN in full
+        contact or if unknown."""
         area = self.measures.contact_area_corrected
         return self.error_area * area / (1.0 - area) if area < 1.0 else math.nan
 
@@ -89,7 +90,7 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
 
 
 def row_numbers(row: StepRow, branches: int) -> list[float]:
-    """Return the values of a row in the order of `columns`; NaN for columns that were not requested."""
+    """Return the values of a row in the order of `columns`; NaN for energies that the job does not request."""
     return [*values_of(_always(branches), row), *row.added]
 
 
@@ -107,7 +108,8 @@ class MeasuresFile(GrowingTable):
         self.table, self._branches = table, branches
 
     def write(self, row: StepRow) -> None:
-        """Append a row; after an error the file is unchanged, but `table` includes the row, which the next run adds."""
+        """Append a row. After an error the file is unchanged, but `table` includes the row: the checkpoint holds it,
+        and the next run adds it to the file."""
         line = cells(row_numbers(row, self._branches))
         self.table = TableMark(self.table.rows + 1, ",".join(line))
         self.append(line)
@@ -118,8 +120,9 @@ def cut_back_table(
 ) -> tuple[TableMark, list[str]]:
     """Remove rows after `step`, and an incomplete row, and change the columns to those of the present job.
 
-    `then` is the table's state when the checkpoint was written: its last row is added if the disk was full. Returns the
-    new state and messages on lost rows. Raises InputError for a damaged file, which is not changed.
+    `then` is the table's state when the checkpoint was written: its last row is added if it is missing because the disk
+    was full. Returns the new state and messages on lost rows. Raises InputError for a damaged file, which is not
+    changed.
     """
     if not path.exists():
         return TableMark(), [f"{path} is missing: the rows up to step {step} are lost"]
@@ -239,7 +242,7 @@ class Console:
             self._write(f"# step {step} of {self._total}, about {clock} left")
 
     def expect(self, total: int) -> None:
-        """Set the total number of steps of the progress bar, as far as known."""
+        """Set the expected total number of steps of the progress bar."""
         self._total = total
         if self._bar is not None:
             self._bar.total = total
@@ -260,7 +263,7 @@ class Console:
 
 @dataclass(frozen=True)
 class Recording:
-    """Outputs of a run of `total` steps (an estimate if `open_ended`).
+    """Settings of the files that a run of `total` steps (an estimate if `open_ended`) writes.
 
     measures.csv has the dissipation of `branches` and the columns `added` by effects; `maps` of a box of this `size`
     [m] are saved after `every` steps.
@@ -285,7 +288,8 @@ class Recorder:
     """Writes the outputs of every step; the constructor and all methods but `close` are collective.
 
     `saved` are the contents of a checkpoint from which the run continues. Raises InputError if files cannot be written.
-    `warnings` are messages on lost results of an earlier run, `problem` is a message on results that cannot be written.
+    `warnings` are messages on lost results of an earlier run. `problem` is a message on results that cannot be written,
+    or ''.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The beginning of a run: at the start, or from the newest sound checkpoint of its job."""
+"""Where a run begins: at the start of its history, or from the newest undamaged checkpoint of the same job."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -38,7 +38,7 @@ def choose_origin(
     """Return the checkpoint to continue from, or None, and warnings about skipped checkpoints; collective.
 
     `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
-    InputError if no existing checkpoint is usable, or if results would be lost.
+    InputError if no existing checkpoint is usable, or if a start from the beginning would replace results.
     """
     directory.refuse_foreign(job.path, plain, restart == "never")
     if restart == "never":
@@ -59,7 +59,7 @@ def choose_origin(
 
 
 def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
-    """Return the record of a run for the marker file; its id is kept if the run continues in its own directory."""
+    """Return the record of a run for the marker file. A run that continues in its own directory keeps its id."""
     new = Claim(outputs.kept(plain))
     return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new
 
@@ -92,13 +92,17 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
         return found
     if problem := checkpoint.verify(found, slab):
         return problem
-    if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
-        keys = on_root(slab.comm, lambda: outputs.differences(found.job, plain, ["history"]))
-        keys = f" ({keys})" if keys else ""
-        other = f"to change what follows, end the running stage at t = {found.time:g} s and add another; or"
-        earlier = "give --restart PATH to continue from an earlier checkpoint"
-        raise InputError(f"{path}: {difference}{keys}; {other} {ADVICE}, {earlier}")
+    on_root(slab.comm, lambda: _refuse_changed_steps(found, job, plain))
     return found
+
+
+def _refuse_changed_steps(found: Contents, job: Job, plain: Mapping[str, Any]) -> None:
+    if difference := find_changed_step(found, job):
+        keys = outputs.differences(found.job, plain, ["history"])
+        raise InputError(
+            f"{found.path}: {difference}{keys and f' ({keys})'}; to change what follows, end the running stage at t = "
+            f"{found.time:g} s and add another; or {ADVICE}, give --restart PATH to continue from an earlier checkpoint"
+        )
 
 
 def _is_own(contents: Contents, directory: Directory) -> bool:
@@ -144,7 +148,8 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Return a message on the first completed step that this job has changed, or ''; later steps may differ."""
+    """Return a message on the first completed step of a checkpoint that is another one in the history of this job, or
+    ''; later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
     kind: Any = type(job).model_fields["history"].annotation
     history = TypeAdapter(kind).validate_python(contents.job["history"])

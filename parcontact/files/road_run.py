@@ -68,7 +68,7 @@ def run_history(job: Job, slab: Slab, options: Options) -> int:
 
 
 def ended(job: Job, until: float | None) -> Job:
-    """Return the job with a history that ends at `until` [s]. Raises InputError if the history ends earlier."""
+    """Return the job with its history cut at `until` [s]. Raises InputError if the history ends earlier."""
     if until is None:
         return job
     kept, start = [], 0.0
@@ -199,8 +199,11 @@ class _Run:
 
 
 def sum_up_errors(rows: Sequence[StepRow], asked: tuple[float, float]) -> Iterable[str]:
-    """Yield sentences on errors of friction and area of rows that slide: the mean, which should not exceed the
-    accuracies `asked`, and the largest with its parts."""
+    """Yield a sentence on the errors of friction, and one on the errors of area, in the rows of sliding.
+
+    It has the mean error, which should not exceed the accuracy `asked` of friction or of area, and the largest error
+    with its sources.
+    """
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
     slid = rows[-1].distance > 0.0

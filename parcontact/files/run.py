@@ -38,7 +38,7 @@ from .stopping import Options, Watch, watching
 class Run:
     """A run of a job: a march through its history, with files; methods are collective.
 
-    `facts` are stored in all checkpoints.
+    `facts` are stored in all checkpoints (`checkpoint.Facts`).
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Run:
             self.recorder.renew(provenance)
 
     def decide(self, march: March) -> bool:
-        """Save if a checkpoint is due; return True if the run ends."""
+        """Save if a checkpoint is due; return True if the run is to end after this step."""
         row = march.row
         verdict = self.watch.decide(row.step, row.step > self.first, self.recorder.problem)
         if verdict.problem:
@@ -251,7 +251,8 @@ def _describe_energies(row: StepRow) -> str:
 def chosen_by_accuracy(job: Job) -> set[str]:
     """Return the parts of the error budget that a smaller `numerics.accuracy` reduces, because it chose their settings.
 
-    Time is such a part if all stages of the slide (without a slide, all stages with a duration) choose their steps.
+    The part "time" is one of them if all stages of the slide choose their steps; without a slide, all stages with a
+    duration.
     """
     numerics = job.numerics
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
@@ -267,7 +268,7 @@ def chosen_by_accuracy(job: Job) -> set[str]:
 
 @dataclass(frozen=True)
 class Ended:
-    """End of a run: the exit code and the last march, or the checkpoint if there was nothing to do."""
+    """End of a run: its exit code, and its march, or the checkpoint of an earlier run that had nothing left to do."""
 
     code: int
     march: March | None

@@ -1,7 +1,7 @@
 """Reasons to stop early or to save, and options of runs and friction curves.
 
 Signals may reach any rank; root knows the stop files and the limit of wall time. One small message per step or point
-makes the decision common.
+brings the decision to all ranks.
 """
 
 import os
@@ -24,8 +24,8 @@ from .directory import Directory
 class StopFile:
     """A stop file shared by all programs of a sweep, which none of them removes.
 
-    It stops programs that run when it is created or touched; a file of time `before` [ns] has no effect. By a second
-    file, `own`, the ranks of one program stop each other.
+    It stops programs that run when it is created or touched: a file that was last changed at the time `before` [ns] has
+    no effect. The ranks of one program stop each other by a second file, `own`.
     """
 
     path: Path
@@ -42,8 +42,8 @@ class StopFile:
         return self.own.exists() or _touched(self.path) not in (0, self.before)
 
     def ask_own(self) -> None:
-        """Stop the other ranks of this program by the file `own`. Ranks end after their present cases if it cannot be
-        written."""
+        """Stop the other ranks of this program by the file `own`. If it cannot be written, they go on with
+        their cases."""
         with suppress(OSError):
             self.own.touch()
 
@@ -77,10 +77,11 @@ def always(doubt: Doubt) -> bool:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a run or a curve: `restart`, `until` [s of the history], `wall` [s since the start of the program].
+    """Options of a run or a curve.
 
-    `sweep_stop_file` is a stop file shared by all cases of a sweep; it is not removed. Warnings for which `shows` is
-    False go into run.log only.
+    `until` is the time in the history [s] at which the run ends, None for the end of the history. `wall` is the limit
+    of the time since the start of the program [s], None without a limit. `sweep_stop_file` stops all cases of a sweep,
+    and no case removes it. Warnings for which `shows` is False go into run.log only.
     """
 
     quiet: bool = False
@@ -102,7 +103,8 @@ REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was fou
 
 @dataclass(frozen=True)
 class Verdict:
-    """Common decision after a step: why the run stops early (`stop`) or fails (`problem`), or ''."""
+    """Decision of all ranks after a step: `stop` says why the run stops early, `problem` why it fails ('' if it does
+    not); `save` is True if a checkpoint is due."""
 
     stop: str = ""
     save: bool = False
@@ -111,8 +113,8 @@ class Verdict:
 
 @dataclass
 class Watch:
-    """Decides after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
-    `sweep_stop_file` is shared by all cases of a sweep; it is not removed."""
+    """Decides after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any; the
+    run does not remove `sweep_stop_file`, which stops all cases of a sweep."""
 
     slab: Slab
     rules: Checkpoint
@@ -129,8 +131,8 @@ class Watch:
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """Return whether the run stops or saves after a step; collective. `began`: this run has made a step.
-        `problem`: a failure on root."""
+        """Return the decision after a step; collective. `began` is True if this run has made a step, and `problem` is a
+        failure on root, or ''."""
         now = time.monotonic()
         if began:
             self._steps.append(now - self._last)
@@ -187,8 +189,8 @@ def limit_time(wall: float | None, environment: Mapping[str, str] = os.environ) 
     """Return the time (of `time.monotonic`) by which a run must end: after `wall` seconds, or with its batch job.
 
     The end of a batch job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME [s since 1970], or PBS_WALLTIME after the start
-    of this program, slightly too late. An end before that start belongs to another job and is ignored. The clock is
-    read once, as it may be changed later.
+    of this program, slightly too late. An end before the start of this program belongs to another job and is ignored.
+    The system's clock is read once, as it may be changed later.
     """
     now = time.monotonic()
     born, epoch = now - age(), now - time.time()

@@ -36,7 +36,7 @@ class SweepRun:
 
     Groups of ranks take cases in turn, one at a time. `act` gets a job, the slab of the group, and a function that
     returns True if a warning is to be shown. `limit` is the latest end (time of `time.monotonic`); `shown` are warnings
-    that were already shown. Failures are recorded only if `runs` is True: `act` runs the cases.
+    that were already shown. `runs` is True if `act` runs the cases; otherwise failures are not recorded.
     """
 
     cases: Sequence[Case]
@@ -50,7 +50,7 @@ class SweepRun:
 
     @cached_property
     def doubts(self) -> SweepWarnings:
-        """Return the warnings of this group of ranks."""
+        """Return the warnings about the cases of this group of ranks."""
         return SweepWarnings(self.shown, at_once=self.groups.count == 1)
 
     @cached_property
@@ -198,7 +198,8 @@ def unfinished_first(chosen: Sequence[Case]) -> list[int]:
 
 
 def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
-    """Return the jobs of all cases that still have to run; root only."""
+    """Return the jobs of the cases that still have to run, which are all of them if the sweep starts `afresh`; root
+    only."""
     return [case.job for case in chosen if afresh or sweep_table.state(case) != "done"]
 
 

@@ -12,7 +12,8 @@ Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
 
 
 class SweepWarnings:
-    """Warnings of a sweep by subject. Subjects `shown` before are not shown again; others `at_once` or at the end."""
+    """Warnings of a sweep by subject. Subjects of the warnings `shown` before are not shown again. Others are shown
+    immediately if `at_once` is True, else at the end."""
 
     def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
         self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1
@@ -33,8 +34,8 @@ class SweepWarnings:
         return new and self._at_once
 
     def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
-        """Return the messages at the end, from the records of all groups of ranks: warnings not yet shown, or shared by
-        several cases."""
+        """Return the messages at the end: warnings that were not yet shown, or that several cases have. `of_groups` has
+        the attribute `kinds` of each group of ranks."""
         whole: Kinds = {}
         for kinds in of_groups:
             for subject, (doubt, cases) in kinds.items():

@@ -1,13 +1,11 @@
-"""Tables of an output directory: what is there, and how it is read and extended.
+"""Tables of an output directory: how they are read, extended and checked.
 
-Tables of numbers are csv files, which may be read while they grow.
+Tables of numbers are csv files, which may be read while they grow. A growing table must have all rows that the marker
+or a checkpoint states, and a table that is written at once must end with a whole line; else it is refused as
+incomplete.
 
-Points of a friction curve are compared with the points in its table to find the missing ones.
-
-steady.lost.json has the points of a friction curve that could not be solved, with the reasons.
-
-A growing table must have all rows that the marker or a checkpoint states. A table written at once must end with a whole
-line. Other tables are refused as incomplete.
+A friction curve continues with the points that its table lacks. Points that could not be solved are in
+steady.lost.json, with the reasons.
 """
 
 import json
@@ -72,7 +70,7 @@ def whole_lines(path: Path) -> Iterator[list[str]]:
 
 
 class Columns(dict[str, list[float]]):
-    """Columns by name; a missing column raises InputError."""
+    """The columns of a table by name; access to a missing column raises InputError."""
 
     def __init__(self, path: Path, found: Iterable[tuple[str, list[float]]]) -> None:
         super().__init__(found)
@@ -127,14 +125,14 @@ def requested_points(
 
 
 def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:
-    """Return the points of a friction curve that are in the columns of its table."""
+    """Return the points of a friction curve from the columns of its table."""
     speeds = columns["velocity"]
     degrees = columns.get("temperature", [math.nan] * len(speeds))
     return list(map(Wanted, speeds, columns["pressure"], degrees))
 
 
 def lacking_points(points: Sequence[Place], there: Sequence[Place]) -> list[int]:
-    """Return the indices of `points` that are not in `there`."""
+    """Return the indices of those `points` that differ from all points `there`."""
     return [number for number, point in enumerate(points) if not any(is_same(point, other) for other in there)]
 
 

@@ -33,8 +33,9 @@ def gather(slab: Slab) -> NDArray[np.uint8]:
 
 
 def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Use the wisdom of a checkpoint, if it has as many ranks, else the stored wisdom of this machine's first run with
-    the same `transforms` (`march.choices.Choices`); collective."""
+    """Use the wisdom `saved` in a checkpoint if it was written by as many ranks as this run has. Otherwise use the
+    wisdom that this machine stored in its first run with the same `transforms` (`march.choices.Choices`).
+    Collective."""
 
     def kept() -> bytes:
         with suppress(OSError):
@@ -47,7 +48,8 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Store the wisdom of this run for later runs, unless the stored wisdom is as large; collective."""
+    """Store the wisdom of this run for later runs, unless the stored wisdom is as large and so has as many transforms;
+    collective."""
     data = gather(slab).tobytes()
     with suppress(OSError):  # a run without stored wisdom works too
         place = _place(transforms, slab) if slab.root else None

@@ -1,4 +1,4 @@
-"""Distributed transforms, and what is stored and multiplied in them.
+"""Distributed transforms, and products and files of their spectra.
 
 The two-dimensional real FFT has a local pass along x, a transpose between ranks, and a local pass along y.
 
@@ -12,29 +12,25 @@ transforms a block, multiplies it by the symbol and transforms it back while it 
 blocks a transform holds one map, and on several ranks its messages, which are less than a map. In single precision
 rows of x-wavenumbers begin at cache lines.
 
-The transpose exchanges rows with all x-wavenumbers for all rows of this rank's x-wavenumbers.
+By the transpose a rank gives away its rows of other ranks' x-wavenumbers, and gets all rows of its own x-wavenumbers.
+It is made in legs, each with some rows of every rank, so that messages never take more than a part of a map. A leg is
+sent before the next one is packed. To do both at the same time would take a second buffer.
 
-The exchange is made in legs, each with some rows of every rank, so that messages never take more than a part of a map.
-A leg is sent before the next one is packed: packing at the same time takes a second buffer, and gained nothing on two
-ranks.
+Spectra are stored without loss as maps, so that files of maps hold them for any number of ranks. The half spectrum of a
+map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by columns. Its real parts fill as
+many columns of a map, its imaginary parts the rest. The imaginary parts of the first column and, if nx is even, of the
+last column do not fit: a second map holds them, for as many spectra as `per_map` says.
 
-Spectra can be stored exactly as maps, so that files of maps hold them for any number of ranks.
-
-The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by columns.
-Its real parts fill as many columns of a map, imaginary parts the rest. The imaginary parts of the first column and, if
-nx is even, of the last column do not fit: a second map holds these columns of `per_map` spectra.
-
-The product of a symbol with the cosine series of a map is a convolution of the map continued mirrored at its edges.
-
-The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the size of
-the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the even
-points first, followed by the odd ones backwards, and V the transform of these n points,
+The cosine series of a map is that of the map mirrored at its edges; its product with a symbol is a convolution of the
+mirrored map. The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of
+the size of the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the
+even points first, followed by the odd ones backwards, and V the transform of these n points,
 
     C(k) = exp(-i theta) V(k) + exp(i theta) V(n - k),        theta = pi k/(2 n),
     V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
 
 For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
-real part and n - k as its imaginary part. So messages, blocks and memory are the same as for the transform.
+real part and n - k as its imaginary part. So messages, blocks and memory are the same as those of the real FFT.
 
 pyfftw is imported without its interfaces to scipy, which are imported on demand: they import half of scipy, which
 takes a fifth of a second. FFTW's choices of algorithms are its wisdom.
@@ -89,7 +85,7 @@ def count_legs(spectrum_bytes: int, ranks: int) -> int:
 
 
 def legs_of(rows: int, height: int, count: int) -> list[slice]:
-    """Return the rows of one rank in each leg, in blocks of `height` rows."""
+    """Return the rows of one rank in each leg; legs consist of blocks of `height` rows, the last one of the rest."""
     blocks = -(-rows // max(height, 1))
     bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
     return [slice(start, stop) for start, stop in pairwise(bounds)]
@@ -103,8 +99,8 @@ def wire_points(legs: list[slice], columns: int) -> int:
 class Leg:
     """One leg of the exchange, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
 
-    Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; `wire`, the
-    buffer of messages to other ranks.
+    Parameters: `dealt` has the x-wavenumbers of each rank, and `rows` the rows of each rank in this leg, counted in the
+    whole map; `wire` is the buffer of messages to other ranks.
     """
 
     def __init__(self, slab: Slab, dealt: list[slice], rows: list[slice], spectrum: Waves, wire: Waves) -> None:
@@ -133,7 +129,7 @@ class Leg:
             parcel[...] = part
 
     def to_columns(self) -> None:
-        """Exchange the messages; collective."""
+        """Send the messages, and put those of other ranks into the spectrum; collective."""
         self._comm.Alltoallv(self._in_rows, self._in_columns)
 
     def to_rows(self) -> None:
@@ -200,9 +196,10 @@ class FFT:
     """Transforms of one size and their buffers.
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
-    `dtype` float64 or float32 of calculations and messages, for maps of either type; `measured`: FFTW measures which
-    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: a transform of the same lengths in double
-    precision, whose memory a transform in single precision shares. The constructor and the methods are collective.
+    `dtype`, float64 or float32, of calculations and messages, for maps of either type; `measured`, True if FFTW
+    measures which algorithm is fastest, False if it estimates, reproducibly; `sharing`, a transform of the same lengths
+    in double precision, whose memory this transform in single precision uses. The constructor and the methods are
+    collective.
     """
 
     def __init__(
@@ -242,7 +239,7 @@ class FFT:
         return np.where((along_x == 0) | (2 * along_x == self.mx), 1.0, 2.0)
 
     def forward(self, field: Array) -> Spectrum:
-        """Return the spectrum `sum h exp(-i q x)` of a map, in a buffer that is valid until the next call;
+        """Return the spectrum `sum h exp(-i q x)` of a map, in a buffer that is valid until the next transform;
         collective."""
         self.along_x(field)
         for columns in self.column_blocks:
@@ -250,7 +247,7 @@ class FFT:
         return self.spectrum
 
     def backward(self, spectrum: Spectrum, out: Array) -> Array:
-        """Put the map of a spectrum into `out`, so that `backward(forward(h), out)` equals h; collective."""
+        """Put the map of a spectrum into `out`, the inverse of `forward`; collective."""
         if spectrum is not self.spectrum:
             self.spectrum[...] = spectrum
         for columns in self.column_blocks:
@@ -280,8 +277,8 @@ class FFT:
     # -- the pass along x ---------------------------------------------------------------------------------------------
 
     def along_x(self, field: Array, transform: Callable[[Array, Spectrum], None] | None = None) -> None:
-        """Transform this rank's rows to its columns of the spectrum; `transform` replaces the pass along x;
-        collective."""
+        """Transform the rows of all ranks along x, and exchange them, so that this rank has its columns of the
+        spectrum; collective. `transform` replaces FFTW along x."""
         self._count()
         transform = transform or self._transform_rows
         for leg, blocks in self._legs:
@@ -482,8 +479,8 @@ CosineWaves = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 class Cosines:
-    """Cosine series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum, plus
-    a narrow block of columns. The constructor and the methods are collective."""
+    """Cosine series of maps of the size of a transform `fft`, in its precision. They use the memory of its spectrum,
+    and add a narrow block of columns. The constructor and the methods are collective."""
 
     def __init__(self, fft: FFT) -> None:
         self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my
@@ -501,7 +498,8 @@ class Cosines:
 
     @property
     def modes(self) -> tuple[CosineWaves, CosineWaves]:
-        """Half waves along x and y for the real parts of a spectrum, and for the imaginary parts."""
+        """Numbers of half waves along x, shape (1, nkx_loc), and y, shape (my, 1), for the real parts of a spectrum,
+        and the same for the imaginary parts."""
         columns, along_y = self.fft.columns, np.arange(self.my)[:, None]
         along_x = np.arange(columns.start, columns.stop)[None, :]
         return (along_x, along_y), (self.mx - along_x, along_y)

@@ -1,16 +1,13 @@
 """Exchange of rows of a map between ranks, and coarser grids.
 
-Whole rows are exchanged point to point: each rank sends to the ranks that need its rows.
+Whole rows are exchanged point to point: each rank sends to the ranks that need its rows. A `RowExchange` is the plan of
+an exchange, made once from the rows of all ranks; it can be used for any map of the slab. By such exchanges maps are
+transferred between a grid and a coarser grid whose cells consist of whole fine cells.
 
-A `RowExchange` is a plan, made once from the rows of all ranks; it can be used for any map of the slab.
-
-Maps are transferred between a grid and a coarser grid whose cells consist of whole fine cells; collective.
-
-A pyramid is a sequence of grids down to a single cell; each cell joins two by two cells of the grid before.
-
-The first `pairs` grids join two cells along x, or along y if `pairs` is negative. Cells at the end of the grid may be
-cut. A cell belongs to the rank that has its last row in the grid before. Once there are few cells, every rank has all
-of them, which needs no further messages.
+A pyramid is a sequence of grids down to a single cell; each cell joins two by two cells of the grid before. The first
+grids may join cells in pairs instead, along x or along y. Where the number of cells is odd, the last cell of the next
+grid is smaller. A cell belongs to the rank that has its last row in the grid before. Once there are few cells, every
+rank has all of them, as a slab of its own, which needs no further messages.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,9 +36,8 @@ class Part(NamedTuple):
 class RowExchange:
     """Plan of an exchange in which this rank gets `count` rows of a map; rows that no rank has are zeros.
 
-    `leaving` has the rows that this rank sends to each rank, `coming` the places of the rows that it gets from each
-    rank. Both are in the order of ranks, and include this rank. A map of which every rank has all rows is on a slab of
-    one rank.
+    `leaving` has the rows of the map that this rank sends to each rank, `coming` the places, among the `count` rows, of
+    the rows that it gets from each rank. Both are in the order of ranks, and include this rank.
     """
 
     def __init__(self, slab: Slab, count: int, leaving: list[Part], coming: list[Part], whole: bool) -> None:
@@ -116,7 +112,8 @@ def _overlaps(parts: NDArray[np.integer], start: int, stop: int) -> list[Part]:
 
 
 def fetch(slab: Slab, field: Array, wanted: NDArray[np.integer]) -> Array:
-    """Return rows of a map for this rank; `wanted` as for `RowExchange.of_parts`; collective. A view on one rank."""
+    """Return rows of a map for this rank; `wanted` is as in `RowExchange.of_parts`. Collective. In a run on one rank
+    the result is a view of the map."""
     if slab.comm.size == 1:
         return field[slice(*wanted[0].tolist())]
     return RowExchange.of_parts(slab, wanted).fetch(field)
@@ -139,9 +136,11 @@ def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
-    """Return `count` rows of a map before this rank's first row and after its last row, shape (count, nx), the nearest
-    first; collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get
-    zeros."""
+    """Return `count` rows of a map before this rank's first row, and `count` rows after its last row; collective.
+
+    Both have the shape (count, nx), and begin with the row nearest to this rank's rows. A map that is not `cyclic`
+    continues with its first and its last row. Ranks without rows get zeros.
+    """
     found = _adjacent_rows(slab, field, (*range(-1, -1 - count, -1), *range(count)), cyclic)
     return found[:count], found[count:]
 
@@ -158,8 +157,8 @@ def _adjacent_rows(slab: Slab, field: Array, offsets: tuple[int, ...], cyclic: b
 
 
 def numbers_next_to(bounds: NDArray[np.integer], offsets: tuple[int, ...]) -> NDArray[np.integer]:
-    """Return row numbers for each rank, shape (ranks, offsets). A negative offset counts from the rank's first row (-1
-    is the row before it), another one from the row after its last."""
+    """Return row numbers for each rank, shape (ranks, offsets). The offset -1 is the row
+    before the rank's first row, and -2 the row before that; 0 is the row after its last row, and 1 the next one."""
     counted = np.array(offsets)
     return np.where(counted < 0, bounds[:, :1], bounds[:, 1:]) + counted
 
@@ -247,8 +246,11 @@ FEW = 8  # tuning: every rank has all cells of a grid with fewer cells than poin
 
 
 def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
-    """Return all steps from a grid to a single cell, the finest first. The first `pairs` steps join cells in pairs. A
-    grid of which every rank has all rows is on a slab of one rank."""
+    """Return all steps from a grid to a single cell, the finest first.
+
+    The first `pairs` steps join only two cells, along x, or along y if `pairs` is negative. The slab of a grid that
+    every rank has as a whole has one rank.
+    """
     grids, shapes = [slab], []
     for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
         shapes.append(shape)
@@ -270,8 +272,10 @@ def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int
 
 
 def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
-    """Return a function of the rank: it returns the slice of cells, `tall` fine rows high, whose last row is on the
-    rank."""
+    """Return a function that returns, for the number of a rank, the slice of the rows of cells that end on this rank.
+
+    Cells are `tall` rows of the fine grid high, 1 or 2.
+    """
     if tall == 1:
         return fine.rows_of
     last = fine.comm.size - 1
@@ -285,7 +289,8 @@ def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
 
 @dataclass(frozen=True)
 class PyramidStep:
-    """The step from a grid of points to the next grid, of cells with a `shape`. Methods are collective."""
+    """The step of a pyramid from a grid of points to a grid of cells, each of which joins as many points along x and y
+    as `shape` says. Methods are collective."""
 
     fine: Slab
     coarse: Slab
@@ -294,7 +299,7 @@ class PyramidStep:
 
     @cached_property
     def above(self) -> int:
-        """Number of rows of points, 0 or 1, that this rank's first cell has on another rank."""
+        """1 if a row of points of this rank's first cell is on the rank before, else 0."""
         return self.fine.rows.start % self.shape[1]
 
     @cached_property
@@ -304,7 +309,7 @@ class PyramidStep:
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
     def complete(self, cells: NDArray[Any]) -> None:
-        """Exchange cells if every rank has all of them."""
+        """Give all cells to all ranks if each rank is to have the whole grid of cells, but has made only its `own`."""
         comm = self.fine.comm
         if self.coarse.comm.size < comm.size:
             starts, stops = cells[:1].nbytes * self._ending.T
@@ -312,11 +317,10 @@ class PyramidStep:
             self.fine.tally["bytes sent"] += cells[self.own].nbytes * (comm.size - 1)
 
     def adjacent_points(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
-        """Return rows next to this rank's rows: -1 is the last row above, 0 the first below, 1 the next; shape
-        (offsets, nx).
+        """Return the rows of points at these `offsets` from this rank's rows (`numbers_next_to`), shape (offsets, nx).
 
-        The first row follows after the last; if the number of rows is odd, with a row of zeros in between. Ranks
-        without points get zeros. The result is empty for cells of one row.
+        The map is cyclic. If it has an odd number of rows, a row of zeros comes between its last and its first row.
+        Ranks without points get zeros. The result is empty for cells of one row.
         """
         if self.shape[1] == 1:
             return points[:0]

@@ -2,10 +2,10 @@
 
 * Work of root alone, whose result or exception every rank receives.
 * Signals to stop or save, stored until all ranks have agreed.
-* Ranks wait for each other before a collective call, so that a rank with another call, or an ended one, blocks none.
-  Every rank sends a checksum of 16 bytes of its next call to the others, and waits until all have. A rank that ends
-  continues to answer the others until all have ended. If it ends with an exception while others wait for it within a
-  step, it aborts them all.
+* Ranks wait for each other before a collective call, so that no rank hangs if another rank makes another call, or has
+  ended. Every rank sends a checksum of 16 bytes of its next call to the others, and waits until all have done so. A
+  rank that ends continues to answer the others until all have ended. If it ends with an exception while others wait for
+  it in the middle of a call, it aborts them all.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ SAVE = signal.SIGCONT  # the first signal of mpirun when it ends a job, long bef
 
 
 class Signals:
-    """Record of the signals of this rank; a second Ctrl-C ends the process at once."""
+    """Record of the signals to stop or save that this rank has received; a second Ctrl-C ends the process at once."""
 
     def __init__(self) -> None:
         self.stop = self.save = False

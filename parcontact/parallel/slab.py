@@ -41,7 +41,8 @@ class Tally(Counter[str]):
     (with rows, to single ranks), `bytes sent` (to other ranks in transforms and moves of rows), `map bytes` (held in
     maps and transform buffers), `map bytes at most` (their maximum), `shift` (sub-cell shifts of a surface).
 
-    If it `only_counts`, arrays take no memory (`Ledger`). Only a ledger uses the `purpose` of arrays.
+    In a plan (`Ledger`) `only_counts` is True, so that arrays take no memory, and bytes are also counted by the
+    `purpose` that is set when an array is made.
     """
 
     only_counts = False
@@ -83,7 +84,7 @@ class Ledger(Tally):
 
 
 class PlannedRank:
-    """Replaces the communicator of one of several ranks in a plan; it exchanges no messages."""
+    """Replaces the communicator of one of several ranks for `parcontact plan`; it exchanges no messages."""
 
     def __init__(self, size: int, rank: int) -> None:
         self.size, self.rank = size, rank
@@ -156,7 +157,7 @@ class Slab:
         return self.nx * self.ny
 
     def empty(self, dtype: DTypeLike = np.float64) -> Array:
-        """Return an uninitialised map of this rank's rows, aligned for transforms and counted."""
+        """Return an uninitialised map of this rank's rows, aligned for transforms, and count its bytes in the tally."""
         return allocate(self.shape, dtype, self.tally)
 
     def zeros(self, dtype: DTypeLike = np.float64) -> Array:
@@ -180,8 +181,8 @@ class Slab:
         """Return sums and maxima over all ranks, sums first, in one message; NaN propagates. Collective.
 
         Every rank receives the numbers of all ranks and adds them in the order of ranks, so that all ranks, and
-        repeated runs, get the same bits. An Allreduce would not guarantee this, and would need a user-defined operator
-        for sums and maxima in one message.
+        repeated runs, get the same bits. MPI's Allreduce does not guarantee this, and would need an own operator for
+        sums and maxima in one message.
         """
         self.tally["allreduce"] += 1
         if self.comm.size == 1:
@@ -247,13 +248,17 @@ def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return the memory of a contiguous array as another array that is not larger, for temporary use."""
+    """Return another array of this shape and type in the memory of a contiguous array, for temporary use. It needs no
+    more bytes than `array` has."""
     return np.ndarray(shape, dtype, buffer=array)
 
 
 class Groups:
-    """The ranks of `everyone` in `count` groups, at most one per rank: `number` is the group of this rank, `comm` the
-    communicator of this group. The sizes of groups differ by at most one; the constructor is collective."""
+    """The ranks of the communicator `everyone` in `count` groups of one or more ranks, whose sizes differ by at most
+    one.
+
+    `number` is the number of the group of this rank, and `comm` is its communicator. The constructor is collective.
+    """
 
     def __init__(self, everyone: MPI.Intracomm, count: int = 1) -> None:
         self.everyone, self.count = everyone, max(1, min(count, everyone.size))
