@@ -32,10 +32,12 @@ SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests of a part
     "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/state.py": SLIDING,
-    "physics/body.py": "scenarios/test_viscoelastic.py",
+    "physics/body.py": "scenarios/test_viscoelastic.py physics/test_material.py",
     "effects/adhesion/section.py": "effects/adhesion/test_effect.py",
     "effects/adhesion/adhesive_law.py": "effects/adhesion/test_gap_solver.py",
-    **dict.fromkeys(("contact/problem.py", "contact/kernels.py"), "solve/test_contact.py"),
+    **dict.fromkeys(("contact/problem.py", "contact/kernels.py"), "solve/test_contact.py solve/test_kernels.py"),
+    "contact/certificate.py": "solve/test_iterate.py",
+    "physics/energy.py": "physics/test_probe.py",
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "effects/heat/test_heat.py accuracy/test_embedded.py",
 }

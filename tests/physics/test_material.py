@@ -219,3 +219,10 @@ def test_limits_of_discrete_modulus(integrator: Integrator) -> None:
         lasting = discrete_modulus(1.0 / dt, dt, *ZENER, integrator=integrator)
         assert_allclose(lasting, ZENER.modulus_inf, rtol=20 * 1e-3 / dt + 1e-15)
     assert_allclose(discrete_modulus(1e3, 1e-13, *ZENER, integrator=integrator), exact, rtol=1e-9)
+
+
+def test_the_shortest_time_is_of_a_branch_with_a_map() -> None:
+    """Steps need not resolve branches without memory, and springs have no time."""
+    series = Prony(1.0, np.array([1.0, 1.0, 1.0, 1.0]), np.array([1e-3, 1e-2, 1e-1, 1.0]))
+    assert ZenerBody(POINT, series, "exponential", memoryless=[0], frozen=[3]).shortest_time == 1e-2
+    assert ZenerBody(POINT, series, "exponential", memoryless=[0, 1, 2, 3]).shortest_time == np.inf

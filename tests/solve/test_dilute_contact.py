@@ -161,3 +161,12 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
     assert (stacked[:36, :40] == heights).all()
     stacked[:36, :40] = heights.min() - 2.0
     assert (stacked == heights.min() - 2.0).all()
+
+
+@pytest.mark.parametrize("along_x", [True, False])
+def test_grids_of_blocks(along_x: bool) -> None:
+    """At most BLOCKS along the longer side, or as many as the finest grid has tiles there."""
+    slab = lambda longer: Slab.alone(longer, 4) if along_x else Slab.alone(4, longer)  # noqa: E731
+    assert starts.is_block_grid(slab(starts.BLOCKS), slab(2 * starts.BLOCKS))
+    assert not starts.is_block_grid(slab(starts.BLOCKS + 1), slab(2 * starts.BLOCKS))
+    assert starts.is_block_grid(slab(2 * starts.BLOCKS), slab(2 * starts.BLOCKS * SIDE))
