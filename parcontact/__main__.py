@@ -23,17 +23,8 @@ from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # delay of the other ranks before they print, so that root prints a common error first [s]
 WAIT_SECONDS = 5.0  # longest time that a failing rank waits for the others to fail with the same error [s]
-LEAVE_FILES = {
-    "run",
-    "steady",
-    "theory",
-    "fit",
-    "surface",
-    "study",
-    "plot",
-    "report",
-    "leak",
-}  # verbs whose output is also in files: they succeed even if standard output is lost
+# verbs whose output is also in files: they succeed even if standard output is lost
+LEAVE_FILES = {"run", "steady", "theory", "fit", "surface", "study", "plot", "report", "leak"}
 REFUSALS = {  # errors of the system about a file that a user can correct: permission, kind, name, free space
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG),
     *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),

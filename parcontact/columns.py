@@ -13,7 +13,7 @@ import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from operator import attrgetter
+from operator import attrgetter, methodcaller
 from typing import Any, NamedTuple
 
 from .capabilities import COUNTED, Column, Table, stated
@@ -396,15 +396,6 @@ STEADY_THEORY: Table = (
 )
 
 
-def _from_theory(name: str, unit: str) -> Column:
-    return Column(f"theory_{name}", unit, "the same from theory.csv")
-
-
-def _in_row(column: Column) -> Column:
-    """Return the column for rows that are mappings; missing values are empty."""
-    return replace(column, of=lambda row: row.get(column.name))
-
-
 SWEEP_RESULTS: Table = (
     Column("mu_max", "", "highest friction of the slide (the last part of the history at one velocity and load)"),
     Column("mu_max_distance", "m", "distance from the start of the slide to `mu_max`"),
@@ -413,7 +404,7 @@ SWEEP_RESULTS: Table = (
     Column("contact_area_corrected", "", "the same for the column `contact_area_corrected`"),
 )
 SWEEP: Table = tuple(
-    _in_row(column)
+    replace(column, of=methodcaller("get", column.name))  # rows are mappings; missing values are empty
     for column in (
         Column("case", "", "its number, from 0"),
         Column("state", "", "done, begun, failed, damaged (its table lacks rows), or -"),
@@ -427,7 +418,11 @@ SWEEP: Table = tuple(
         ),
         Column("error_area", "", "the same for the corrected contact area; without a slide, its last value"),
         Column("seconds", "s", "wall time of all steps"),
-        *(_from_theory(one.name, one.unit) for one in SWEEP_RESULTS if one.name != "contact_area_corrected"),
+        *(
+            Column(f"theory_{one.name}", one.unit, "the same from theory.csv")
+            for one in SWEEP_RESULTS
+            if one.name != "contact_area_corrected"
+        ),
         Column("loss", "J", "with `cycles`: loss of the last cycle", when="cycles"),
         Column("error_loss", "", "its estimated relative error", when="cycles"),
         Column("phase", "rad", "with `cycles`: phase of the last cycle", when="cycles"),

@@ -53,12 +53,8 @@ def _round_towards(value: float, digits: int, side: int) -> str:
     text = f"{value:.{digits}g}"
     if not value or not math.isfinite(value) or side * (float(text) - value) >= -ROUNDING * abs(value):
         return text
-    return f"{float(text) + side * 10.0 ** (_power(value) - digits + 1):.{digits}g}"
-
-
-def _power(value: float) -> int:
-    """Return the power of ten of the first digit."""
-    return math.floor(math.log10(abs(value)))
+    power = math.floor(math.log10(abs(value)))  # of the first digit
+    return f"{float(text) + side * 10.0 ** (power - digits + 1):.{digits}g}"
 
 
 def span(low: float, high: float, unit: str, digits: int = 3) -> str:

@@ -303,7 +303,10 @@ def _candidates(
     texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]
 ) -> dict[int, list[MeasuredColumn]]:
     """Return the lines that name enough columns, or else the one that names most, for the message."""
-    heads = {at: _most_named(text, dialect) for at, text in texts.items()}
+    heads = {
+        at: max(([read_cell(cell) for cell in cells] for cells in _splits(text, dialect)), key=_known)
+        for at, text in texts.items()
+    }
     if found := {at: head for at, head in heads.items() if enough({column.name for column in head})}:
         return found
     most = max(heads, key=lambda at: _known(heads[at]), default=-1)
@@ -312,10 +315,6 @@ def _candidates(
 
 def _known(columns: Sequence[MeasuredColumn]) -> int:
     return len({column.name for column in columns} & NAMES)
-
-
-def _most_named(text: str, dialect: Dialect) -> list[MeasuredColumn]:
-    return max(([read_cell(cell) for cell in cells] for cells in _splits(text, dialect)), key=_known)
 
 
 def _splits(text: str, dialect: Dialect) -> Iterator[list[str]]:

@@ -75,10 +75,6 @@ class GrowingMaps:
         self.path, self.slab, self.size, self.axes, self.units = path, slab, size, axes, units
         self.provenance = Provenance(())
 
-    def save_place(self, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
-        """Save maps by the names of their data sets, and then the coordinates of their place. Raises RunError."""
-        hdf5.save_maps(self.path, self.slab, index, maps, marks)
-
     def replace_file(
         self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: list[int] | None = None
     ) -> None:
@@ -146,7 +142,10 @@ class SteadyMaps(GrowingMaps):
             found = None
         saved = found.points if found else {}
         others = [point for point in saved.values() if tables.lacking_points([point], points)]
-        there = [_row_of(point, saved) for point in (*points, *others)]
+        there = [
+            next((row for row, other in saved.items() if tables.is_same(point, other)), None)
+            for point in (*points, *others)
+        ]
         self.lacking = [index for index in range(len(points)) if there[index] is None]
         if found is None or found.shape[0] != len(there):
             kept = {index: row for index, row in enumerate(there) if row is not None}
@@ -159,12 +158,8 @@ class SteadyMaps(GrowingMaps):
     def save(self, index: int, maps: Mapping[str, Array]) -> None:
         """Save the maps of a point; raises RunError."""
         marks = dict(zip(self.axes, self.points[index], strict=True))
-        self.save_place(self._rows[index], {DATASETS[name]: maps[name] for name in self.names}, marks)
-
-
-def _row_of(point: tuple[float, ...], saved: Mapping[int, tuple[float, ...]]) -> int | None:
-    """Return the index of a point among the `saved` ones."""
-    return next((row for row, other in saved.items() if tables.is_same(point, other)), None)
+        named = {DATASETS[name]: maps[name] for name in self.names}
+        hdf5.save_maps(self.path, self.slab, self._rows[index], named, marks)
 
 
 class FieldsFile(GrowingMaps):
@@ -225,7 +220,8 @@ class FieldsFile(GrowingMaps):
         hdf5.change(self.path, self.slab, provenance.renew)
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
-        self.save_place(self.steps[step], {name: maps[name] for name in self.names}, {"t": time})
+        named = {name: maps[name] for name in self.names}
+        hdf5.save_maps(self.path, self.slab, self.steps[step], named, {"t": time})
         if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
             self._draw()
 

@@ -30,7 +30,7 @@ from .checkpoint import Contents, Facts
 from .directory import Directory
 from .outputs import Claim
 from .provenance import Link, Provenance, cite_lines, extend_chain
-from .recorder import Recorder, Recording, StepRow
+from .recorder import Recorder, Recording
 from .restart import RestartPoint
 from .stopping import Options, Watch, watching
 
@@ -198,7 +198,10 @@ class Run:
                     console.say(text)
         self._log_cycles()
         if self.march.scene.energy is not None:
-            console.say(_describe_energies(row))
+            within = (
+                f"each ± {quantity(row.error_energy, 'J', 2)}" if math.isfinite(row.error_energy) else "errors unknown"
+            )
+            console.say(f"work {quantity(row.work, 'J', 4)}, dissipated {quantity(row.dissipated, 'J', 4)}, {within}")
         for text in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(text)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
@@ -240,12 +243,6 @@ class Run:
                 self.console.say(text)
         except (OSError, InputError) as error:
             self.console.warn(f"cycles.csv cannot be written: {error}")
-
-
-def _describe_energies(row: StepRow) -> str:
-    """Return a sentence on the energies since the start, with their error."""
-    within = f"each ± {quantity(row.error_energy, 'J', 2)}" if math.isfinite(row.error_energy) else "errors unknown"
-    return f"work {quantity(row.work, 'J', 4)}, dissipated {quantity(row.dissipated, 'J', 4)}, {within}"
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:

@@ -226,7 +226,7 @@ def read_results(path: Path) -> Columns:
             f"{path} has no column {', '.join(without)}: it was not written by `parcontact theory`; move it away"
         )
     for end, what in lasts:
-        count = _last_step(columns) if path.name == outputs.RUN.table else len(columns["velocity"])
+        count = [-1.0, *columns["step"]][-1] if path.name == outputs.RUN.table else len(columns["velocity"])
         if count < end:
             raise InputError(f"{path} is damaged: {what}, and the table lacks rows; {MEND_CUT}")
     curve = path.with_name(outputs.STEADY.table)
@@ -257,11 +257,6 @@ def find_lost_rows(directory: Path) -> str:
         f"{path} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; "
         f"correct it, or move {directory} away to run the job again"
     )
-
-
-def _last_step(columns: Columns) -> float:
-    steps = columns["step"]
-    return steps[-1] if steps else -1.0
 
 
 def _find_ends(path: Path) -> Iterator[tuple[float, str]]:

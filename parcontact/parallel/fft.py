@@ -75,25 +75,7 @@ else:
 
 Waves = NDArray[np.complexfloating]
 LEGS = 4  # tuning: largest number of legs of an exchange
-LEG_BYTES = 1 << 19
-
-
-def count_legs(spectrum_bytes: int, ranks: int) -> int:
-    """Return the number of legs for a spectrum of `spectrum_bytes` on all ranks: one per LEG_BYTES of a rank, at most
-    LEGS."""
-    return max(1, min(LEGS, spectrum_bytes // ranks // LEG_BYTES)) if ranks > 1 else 1
-
-
-def legs_of(rows: int, height: int, count: int) -> list[slice]:
-    """Return the rows of one rank in each leg; legs consist of blocks of `height` rows, the last one of the rest."""
-    blocks = -(-rows // max(height, 1))
-    bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
-    return [slice(start, stop) for start, stop in pairwise(bounds)]
-
-
-def wire_points(legs: list[slice], columns: int) -> int:
-    """Return the number of wavenumbers that the longest leg sends to other ranks: its rows times `columns`."""
-    return max(leg.stop - leg.start for leg in legs) * columns
+LEG_BYTES = 1 << 19  # tuning: bytes of the spectrum of a rank for each leg, if these are not too many
 
 
 class Leg:
@@ -371,7 +353,10 @@ class FFT:
         ranks, row_bytes = self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
         rows = part.stop - part.start
         height = _block_height(rows, row_bytes, self.my, ranks)
-        return height, legs_of(rows, height, count_legs(self.my * row_bytes, ranks))
+        count = max(1, min(LEGS, self.my * row_bytes // ranks // LEG_BYTES)) if ranks > 1 else 1
+        blocks = -(-rows // max(height, 1))
+        bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
+        return height, [slice(start, stop) for start, stop in pairwise(bounds)]
 
     def _make_blocks(self) -> Spectrum:
         """Make blocks of rows and of columns. Return the buffer of messages in one leg of the exchange."""
@@ -380,7 +365,8 @@ class FFT:
         block = (height if slab.comm.size > 1 else 0, _pitch(waves, self.complex.itemsize))
         self._wave_block = allocate(block, self.complex, slab.tally)[:, :waves]
         self.column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
-        return allocate((wire_points(legs, waves - self.shape[1]),), self.complex, slab.tally)
+        longest = max(leg.stop - leg.start for leg in legs)
+        return allocate((longest * (waves - self.shape[1]),), self.complex, slab.tally)
 
     def _make_legs(self) -> None:
         """Make the legs of the exchange, each with this rank's blocks of rows."""
