@@ -290,7 +290,7 @@ FIELDS: Table = (
     Column("step", "", "steps of the maps"),
 )
 
-STEADY: Table = (  # rows are `march.point.Point`
+STEADY: Table = (  # rows are `march.steady.Point`
     Column("velocity", "m/s", "speed", attrgetter("speed")),
     _measured("pressure", "Pa", PRESSURE),
     *FORCES,

@@ -23,7 +23,7 @@ from parcontact.bands.band import Band
 from parcontact.bands.choice import cut_bands
 from parcontact.bands.road_sliding import SURE, RoadSliding
 from parcontact.march.budget import ErrorParts
-from parcontact.march.point import Point
+from parcontact.march.steady import Point
 from parcontact.parallel.slab import Slab
 
 COMPOUNDS: dict[str, dict[str, Any]] = {

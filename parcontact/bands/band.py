@@ -29,9 +29,8 @@ from ..job.listing import answers
 from ..job.surfaces import GivenHeights
 from ..march.budget import ErrorBudget
 from ..march.choices import choices
-from ..march.point import branch_powers
 from ..march.scene import Setup, set_up
-from ..march.steady import judge_state, tolerance_of
+from ..march.steady import branch_powers, judge_state, tolerance_of
 from ..march.time_error import properties_of
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab

@@ -27,7 +27,7 @@ from ..errors import RunError
 from ..files import outputs
 from ..files.recorder import StepRow
 from ..job import Job
-from ..march.point import Point
+from ..march.steady import Point
 from ..parallel.slab import Array, Slab
 from ..physics.records import Measures
 from .band import NODES, PressureLadder, Rung

@@ -18,8 +18,8 @@ from ..job.listing import answers
 from ..march.budget import ErrorBudget, ErrorParts
 from ..march.choices import choices
 from ..march.curve import States, on_one_grid
-from ..march.point import Point
 from ..march.scene import Setup
+from ..march.steady import Point
 from ..parallel.slab import Array, Slab
 from ..physics.records import Certificate, Measures
 from .band import Rung, Vector, direction_of

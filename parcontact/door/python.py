@@ -33,8 +33,8 @@ from ..files.tables import Wanted
 from ..job import Job, log_range
 from ..job.history import Timeline
 from ..march import curve, mesh, sanity
-from ..march.point import Point
 from ..march.scene import set_up
+from ..march.steady import Point
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root, wait_for_all
 from ..parallel.slab import Slab

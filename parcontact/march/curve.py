@@ -30,9 +30,8 @@ from ..parallel.slab import Array, Slab
 from ..printed import per_cent
 from . import choices, sanity, scene
 from .budget import advice, describe, exceeds
-from .point import Point
 from .scene import Setup
-from .steady import SteadySliding
+from .steady import Point, SteadySliding
 
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # corr.area: corrected area
 

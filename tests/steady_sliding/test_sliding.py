@@ -16,9 +16,8 @@ from parcontact.door import memory, plan
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march import scene, steady
-from parcontact.march.point import Point
 from parcontact.march.scene import Setup
-from parcontact.march.steady import SteadySliding, stiffer_lines
+from parcontact.march.steady import Point, SteadySliding, stiffer_lines
 from parcontact.parallel.slab import Slab
 from parcontact.theory import wavy
 

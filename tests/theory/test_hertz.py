@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 
 from parcontact.job import Job
 from parcontact.march import scene
-from parcontact.march.point import Point
-from parcontact.march.steady import SteadySliding
+from parcontact.march.steady import Point, SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.theory import hertz
 

@@ -29,8 +29,8 @@ from ...bands.road_sliding import RoadSliding
 from ...contact.problem import Contact
 from ...errors import InputError
 from ...job import Job
-from ...march.point import Point
 from ...march.scene import Setup
+from ...march.steady import Point
 from ...parallel.slab import Array
 from ...physics.convolution import travelling_wavenumbers, wavenumbers
 from ..branches import highest_temperature_of

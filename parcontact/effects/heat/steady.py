@@ -15,8 +15,8 @@ import numpy as np
 from ...contact.problem import Box, Mask
 from ...errors import Doubt, InputError, Kind, UnsolvedError
 from ...job import Job, Zener
-from ...march.point import Point
 from ...march.scene import Setup
+from ...march.steady import Point
 from ...parallel.slab import Array
 from ...physics.records import Measures
 from ..branches import highest_temperature_of, temperature_of

@@ -13,8 +13,8 @@ from ...bands.choice import Cut
 from ...bands.road_sliding import RoadSliding
 from ...contact.problem import Contact
 from ...job import Job
-from ...march.point import Point
 from ...march.scene import Setup
+from ...march.steady import Point
 from ...parallel.slab import Array
 from .steady import SHARE, Vector, depths_between, strains_of
 

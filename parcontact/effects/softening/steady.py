@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import Doubt, Kind, RunError
-from ...march.point import Point, count_octaves, in_rounds
 from ...march.scene import Setup
+from ...march.steady import Point, count_octaves, in_rounds
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
 from ...physics.convolution import wavenumbers

@@ -16,8 +16,7 @@ from parcontact.effects.heat.solver import Conductor, Depths, Heating, MeanMemor
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.march import scene
-from parcontact.march.point import Point
-from parcontact.march.steady import SteadySliding
+from parcontact.march.steady import Point, SteadySliding
 from parcontact.parallel.slab import Slab
 
 PRESSURE, SPEED, LENGTH = 1e5, 0.2, 1e-3

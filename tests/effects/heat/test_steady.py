@@ -18,8 +18,7 @@ from parcontact.errors import InputError, JobError, RunError
 from parcontact.files.tables import read_columns
 from parcontact.march import scene
 from parcontact.march.curve import request
-from parcontact.march.point import Point
-from parcontact.march.steady import SteadySliding
+from parcontact.march.steady import Point, SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.results import band_charts
 from parcontact.rubber.shift import WLF, Factors, highest_temperature

@@ -22,8 +22,7 @@ from parcontact.effects.softening.steady import doubts_of_points, strains_at_oct
 from parcontact.effects.softening.strain_table import Softened, StrainTable
 from parcontact.errors import InputError, JobError
 from parcontact.march import sanity, scene
-from parcontact.march.point import Point
-from parcontact.march.steady import SteadySliding
+from parcontact.march.steady import Point, SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.physics.convolution import wavenumbers
 from parcontact.results import band_charts, prediction
