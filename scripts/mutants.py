@@ -30,7 +30,7 @@ MOST_TESTS = 3  # files of tests of a part, of those that import it
 FEWEST = 8  # least places to break in a part
 SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests of a part
-    "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
+    "march/loop.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/state.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py physics/test_material.py",
     "effects/adhesion/section.py": "effects/adhesion/test_effect.py",

@@ -1,23 +1,242 @@
-"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller after each step."""
+"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller after each step.
 
+`make_step` returns the next state of a scene and leaves the state before it unchanged. A step begins the body, solves
+the contact, measures, commits the body, estimates errors, and updates effects. A step that is rejected or fails is
+dropped; nothing has to be undone. No map is copied for this: the new pressure is in the spare map of the state, and the
+new displacement in a map of the solver's workspace, which gets the map of the old displacement in exchange. Operations
+in place come last, when nothing can fail.
+"""
+
+import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from ..effects.effect import Detached, nothing_holds
+from ..contact.problem import Approach, Control, MeanPressure
+from ..effects.effect import (
+    Changes,
+    Detached,
+    EdgeMotion,
+    Instant,
+    PreviousContacts,
+    PreviousPressure,
+    Sheared,
+    effect_values,
+    nothing_holds,
+)
 from ..errors import InputError
 from ..files.checkpoint import Contents, Facts
 from ..files.recorder import StepRow
 from ..job.calculation import FIELDS_NEED, components_of
-from ..job.history import Step, Timeline
+from ..job.history import MadeStep, Step, Timeline
 from ..parallel.slab import Array
-from ..physics.body import remembers
+from ..physics.body import Trial, remembers, states_errors, surface_of
+from ..physics.energy import EnergyMemory, Pressed
 from ..physics.records import Entry
-from .budget import ErrorSums
-from .laws import DetachedError, choose_contact_law
+from . import laws
+from .budget import ErrorBudget, ErrorSums, add_shear
+from .laws import DetachedError, StepError, cells_moved, choose_contact_law
 from .scene import Scene
-from .state import State, entries, first_state, restored, save_state
-from .step import make_step
+from .state import (
+    ErrorMemory,
+    SolvedStep,
+    State,
+    StepErrors,
+    add_energy_error,
+    energies_of,
+    entries,
+    error_of_energies,
+    estimate_errors,
+    first_state,
+    restored,
+    save_state,
+)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """An accepted step: its solution, errors and motion, and its record if it was chosen."""
+
+    solved: SolvedStep
+    errors: StepErrors
+    motion: EdgeMotion
+    verdict: MadeStep | None
+
+
+def make_step(scene: Scene, state: State, step: Step) -> State:
+    """Return the state after a step, or after a shorter step if the errors are too large; collective. Raises
+    StepError."""
+    began, calls = time.perf_counter(), scene.slab.tally["operator"]
+    made = _accepted(scene, state, step)
+    solved, errors, contact = made.solved, made.errors, made.solved.contact
+    energy = _advance_energy(scene, state, solved)
+    changes, sheared = _follow(scene, state, made, energy)
+    if state.chosen is not None and made.verdict is not None:
+        turned = max((each.turned for each in changes.values()), default=0.0)
+        state.chosen.add(scene.controller.limit(made.verdict, made.solved.step.dt, turned))
+    if solved.body.displacement is scene.solver.workspace.pressure:
+        scene.solver.workspace.pressure = surface_of(state.body)
+    step, last = solved.step, state.contact.last
+    followed = {name: each.memory for name, each in changes.items()}
+    measures = solved.measures if sheared is None else sheared.measures
+    stated = all(each.states_errors for each in changes.values()) and not measures.at_edge and errors.resolved
+    errors = replace(errors, budget=_budget_of(made, sheared))
+    work, stored, lost, split = energies_of(scene, energy, followed)
+    known = errors if stated and states_errors(scene.material) else None
+    of_energy = add_energy_error(state.memories["errors"].energy, known, sheared, lost - state.row.dissipated)
+    error_energy = error_of_energies(scene, of_energy, errors.of_area * stored, followed)
+    remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), _describe_passed(step))
+    row = StepRow(
+        step.number,
+        step.time,
+        state.row.distance + math.dist(step.position, last.position),
+        measures,
+        contact.iterations,
+        contact.certificate,
+        scene.slab.tally["operator"] - calls,
+        work,
+        stored,
+        lost,
+        error_energy,
+        split,
+        seconds=time.perf_counter() - began,
+        remark="; ".join(f"{laws.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
+        errors=errors.budget if stated else None,
+        added=effect_values(scene.effects, followed),
+    )
+    pressure = PreviousPressure(contact.p, solved.trial.alpha, step.position)
+    pasts = state.contact.pressures
+    return state.after(
+        row=row,
+        contact=PreviousContacts((pressure, *pasts[:-1]), pasts[-1].pressure, contact.d),
+        law=solved.of_law.memory,
+        material=solved.body,
+        errors=ErrorMemory(errors.friction, state.errors, of_energy),
+        energy=energy,
+        tolerance=scene.controller.learn(state.tolerance, contact.certificate.worst, errors.lasting),
+        **followed,
+    )
+
+
+def _accepted(scene: Scene, state: State, step: Step) -> _Made:
+    """Solve a step, or a shorter one if its errors are too large; collective. Raises StepError, and DetachedError if
+    the surfaces detach even in the shortest step."""
+    law = choose_contact_law(scene)
+    while True:
+        try:
+            solved = _solve(scene, state, step)
+        except (DetachedError, StepError):
+            shorter = step.decide(0.0, math.inf) if step.decide is not None and law.may_shorten else None
+            if not isinstance(shorter, Step):
+                raise
+            step = shorter
+            continue
+        errors = estimate_errors(scene, state.friction, solved)
+        motion = law.motion(solved.of_law, state.row.measures, solved.measures)
+        if step.decide is None:
+            return _Made(solved, errors, motion, None)
+        error = 0.0 if motion.untouched else scene.slab.agree(errors.step)
+        verdict = step.decide(error, motion.front, motion.begins)
+        if not isinstance(verdict, Step):
+            return _Made(solved, errors, motion, verdict)
+        step = verdict
+
+
+def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
+    """Solve a step, measure it and commit the body; collective. Raises StepError and DetachedError."""
+    body, law, before = scene.material, choose_contact_law(scene), state.row.measures
+    trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
+    control, tolerance = _control(scene, step, trial), scene.controller.tolerance(state.tolerance, step)
+    of_law = law.solve(trial, step, control, state.law, state.contact, before, tolerance)
+    contact = of_law.contact
+    if of_law.end == "detached":
+        raise DetachedError(step.time, step.load)
+    if contact.failure and not laws.accepts(scene, contact):
+        moved = math.hypot(*cells_moved(scene, step, state.contact.last.position))
+        raise laws.of_solve(scene, step, contact, contact, [], trial.effective, moved)
+    maps = contact.p, trial.alpha, contact.u, trial.effective, contact.d, of_law.touching
+    measures = scene.probe.measure(*maps, step.position, step.velocity, of_law.least_load)
+    if not measures.finite:
+        raise laws.not_finite(scene, step, measures)
+    memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
+    return SolvedStep(step, trial, of_law, measures, memory)
+
+
+def _control(scene: Scene, step: Step, trial: Trial) -> Control:
+    """Return the prescribed load of a step in the run's units; collective. Raises StepError."""
+    grid = scene.choices.grid
+    if step.control == "approach":
+        laws.refuse_beyond_full_contact(scene, step, trial.effective)
+        return Approach((step.load + scene.setup.surface.datum) / scene.units.height)
+    mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
+    return MeanPressure(mean / (trial.alpha * scene.units.pressure))
+
+
+def _advance_energy(scene: Scene, state: State, solved: SolvedStep) -> EnergyMemory | None:
+    """Return the energies of the body after a step; None without energies; collective."""
+    if scene.energy is None or state.energy is None:
+        return None
+    last = state.contact.last
+    now, before = Pressed(solved.contact.p, solved.trial.alpha), Pressed(last.pressure, last.alpha)
+    step, body = solved.step, solved.body
+    energy = scene.energy.advance(state.energy, step.dt, now, before, solved.contact.u, body, step.growth)
+    return energy.without_work(state.energy) if solved.of_law.end == "open" else energy
+
+
+def _follow(
+    scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
+) -> tuple[dict[str, Changes[Any]], Sheared | None]:
+    """Return the changes by effects in a step, and update the relaxation of the body; collective."""
+    solved, u, gained, dissipated = made.solved, made.solved.body.displacement, math.nan, math.nan
+    assert u is not None
+    if energy is not None and state.energy is not None and scene.energy is not None:
+        now, old = ((each.stored, float(each.dissipated.sum())) for each in (energy, state.energy))
+        dissipated = scene.energy.unit * (now[1] - old[1])
+        gained = scene.energy.unit * (now[0] - old[0]) + dissipated
+    (x, y), (x_before, y_before) = solved.step.position, state.contact.last.position
+    instant = Instant(
+        solved.step,
+        solved.of_law,
+        solved.trial.alpha,
+        u,
+        state.row.measures,
+        solved.measures,
+        (x - x_before, y - y_before),
+        gained,
+        dissipated,
+        made.motion.front,
+        made.motion.untouched,
+        made.errors.of_friction,
+        made.errors.of_area,
+    )
+    changes = dict[str, Changes[Any]]()
+    for name, effect in scene.effects.items():
+        changes[name] = effect.follow(instant, state.memories[name])
+        if (sheared := changes[name].sheared) is not None:
+            errors = replace(made.errors, budget=_budget_of(made, sheared))
+            instant = replace(instant, sheared=sheared, error_friction=errors.of_friction)
+    scene.relax({name: each.memory for name, each in changes.items()})
+    return changes, instant.sheared
+
+
+def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
+    """Return the error budget of a step, with that of tractions along the surface; None where nothing touches."""
+    budget = made.errors.budget
+    if budget is None or sheared is None:
+        return budget
+    body, now = made.solved.measures.friction, sheared.measures
+    errors = sheared.error, sheared.share, sheared.time, sheared.mesh
+    return add_shear(budget, body, now.friction_interface, now.friction, *errors)
+
+
+def _describe_passed(step: Step) -> str:
+    """Return a sentence on a step that replaces several; '' for other steps."""
+    if not step.passed:
+        return ""
+    return f"replaces {step.passed} further steps: at rest, under a constant load, nothing changes"
+
 
 FIELDS_OF_EFFECTS = {part: need for name, need in FIELDS_NEED.items() for part in components_of(name)}
 
