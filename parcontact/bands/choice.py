@@ -29,7 +29,7 @@ from ..job.listing import answers
 from ..job.measured_maps import prepare
 from ..job.parts import AUTO
 from ..march import map_sentences
-from ..march.measured_range import doubt_band
+from ..march.sanity import doubt_band
 from ..parallel.slab import Array
 from ..physics.roughness import EDGE, Roughness
 from ..printed import quantity

@@ -263,12 +263,11 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     if not job.depends_on_heights and not job.measured:
         return list(job.doubts)
     from ..march import sanity
-    from ..march.measured_range import doubt_band
     from ..march.scene import describe_roughness, set_up
     from ..parallel.slab import Slab
 
     if not sanity.is_quickly_made(job):
-        return [*job.doubts, *doubt_band(job, degrees)]
+        return [*job.doubts, *sanity.doubt_band(job, degrees)]
     setup = set_up(job, Slab.alone(*job.grid.points))
     notes[-1] += [*setup.remarks.notes, *describe_roughness(setup)]
     sanity.refuse_approaches(setup)

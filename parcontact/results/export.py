@@ -19,7 +19,7 @@ from ..files.provenance import PROGRAM
 from ..files.tables import Wanted
 from ..job import load
 from ..job.listing import answers
-from ..march.measured_range import doubt_band
+from ..march.sanity import doubt_band
 from ..printed import quantity
 from .results import ExportedTable, Results
 

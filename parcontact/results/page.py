@@ -37,7 +37,7 @@ from ..job.listing import plain_data
 from ..job.meaning import excited_band
 from ..job.reading import CASES, shown_job
 from ..march import rigid_surface
-from ..march.measured_range import excited_bands
+from ..march.sanity import excited_bands
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics

@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..files import hdf5, outputs, tables
 from ..job import Job, listing, load
 from ..job.listing import answers
-from ..march.measured_range import excited_bands
+from ..march.sanity import excited_bands
 from ..physics.prony import complex_modulus
 from ..printed import quantity, with_error
 from . import band_charts, info, maps, plotted_run, slide, style

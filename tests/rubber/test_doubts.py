@@ -11,7 +11,7 @@ import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Flat, Job, Rough, Sphere, Wave
 from parcontact.job.surfaces import wave_numbers
-from parcontact.march.measured_range import doubt_band
+from parcontact.march.sanity import doubt_band
 from parcontact.rubber import compound, moduli
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, read_shift
