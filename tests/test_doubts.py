@@ -10,7 +10,7 @@ import pytest
 
 import parcontact
 from parcontact.job import Job, meaning
-from parcontact.march.map_sentences import WARN_FLAT_MAP
+from parcontact.march.rigid_surface import WARN_FLAT_MAP
 from parcontact.march.sanity import WARN_CELLS, WARN_SEAM
 from parcontact.printed import rounded_down, rounded_up
 

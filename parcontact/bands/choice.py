@@ -28,7 +28,7 @@ from ..job.limits import doubt_memory
 from ..job.listing import answers
 from ..job.measured_maps import prepare
 from ..job.parts import AUTO
-from ..march import map_sentences
+from ..march import rigid_surface
 from ..march.sanity import doubt_band
 from ..parallel.slab import Array
 from ..physics.roughness import EDGE, Roughness
@@ -194,7 +194,7 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     grid = Grid(points=(nx, ny), size=size)
     smooth = part.model_copy(update={"short_wavelength": max(shortest, part.short_wavelength or 0.0)})
     found = prepare(smooth, grid, whole)
-    doubts = [*map_sentences.doubt_sizes(found), *map_sentences.doubt_outliers(found)]
+    doubts = [*rigid_surface.doubt_sizes(found), *rigid_surface.doubt_outliers(found)]
     if shortest > max(size) / FEWEST_WAVES:
         cells = max(length / n for length, n in zip(whole.size, whole.heights.shape[::-1], strict=True))
         seam = {"longest": shortest, "side": max(size), "points": RESOLVED, "seam": RESOLVED * cells}
@@ -202,7 +202,7 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     waves = np.fft.fft2(found.heights) / found.heights.size
     qy, qx = (2.0 * np.pi * np.fft.fftfreq(n, length / n) for n, length in zip((ny, nx), size[::-1], strict=True))
     slope = math.sqrt(float(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2))))
-    return MapBand(grid, found.heights, slope, tuple(map_sentences.describe_treatment(found)), tuple(doubts))
+    return MapBand(grid, found.heights, slope, tuple(rigid_surface.describe_treatment(found)), tuple(doubts))
 
 
 WIDTH = 0.75  # accuracy: width of a band [decades]; the error of friction is 4 % for 0.65 to 1

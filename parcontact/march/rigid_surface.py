@@ -1,16 +1,16 @@
-"""The rigid surface of a job: the sum of shapes, waves, roughness and maps from files."""
+"""The rigid surface of a job, a sum of shapes, waves, roughness and maps from files, and sentences about the maps."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import reduce
 from operator import add
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .. import job as jobs
-from ..errors import Doubt
+from ..errors import Doubt, Kind
 from ..job import Grid, Job, meaning
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.root import on_root
@@ -19,6 +19,11 @@ from ..physics import surface
 from ..physics.loops import lowest, shape_of
 from ..physics.roughness import Roughness, shortest_wave
 from ..physics.surface import Conical, FlatEnded, Pyramidal, Round, Shape, Surface, single_wave
+from ..printed import per_cent, quantity
+
+if TYPE_CHECKING:
+    from ..job.map_files import Map
+    from ..job.measured_maps import Prepared
 
 ROUNDING = 1e-8  # accuracy: relative, by which the shortest wavelength of a table is reduced so that it is included
 FLAT = 1e-14  # accuracy: range of heights over their magnitude, up to which a surface is flat
@@ -133,19 +138,18 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks)
     """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to its `remarks`;
     collective."""
     from ..job import map_files, measured_maps
-    from . import map_sentences
 
     heights: list[Array] = []
 
     def make() -> tuple[list[Doubt], tuple[measured_maps.MeasuredSpectrum, tuple[float, float]] | None]:
         found = map_files.read_map(part)
         if found.is_line:
-            remarks.notes.append(map_sentences.describe_line(part, found))
+            remarks.notes.append(describe_line(part, found))
             return [], measured_maps.of_line(part, found)
         prepared = measured_maps.prepare(part, grid, found)
         heights.append(prepared.heights)
-        remarks.notes.extend(map_sentences.describe_treatment(prepared))
-        return [*map_sentences.doubt_sizes(prepared), *map_sentences.doubt_outliers(prepared)], None
+        remarks.notes.extend(describe_treatment(prepared))
+        return [*doubt_sizes(prepared), *doubt_outliers(prepared)], None
 
     doubts, line = on_root(fft.slab.comm, make)
     if line is not None:
@@ -210,3 +214,100 @@ def heights_of(surface: Surface) -> HeightRange:
     total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)
     span = top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
     return HeightRange(span, top, total / surface.slab.points)
+
+
+# -- sentences about measured maps -------------------------------------------------------------------------------------
+
+LARGEST, SMALLEST = 1.0, 5e-11  # m: largest side of a map, and least distance of its points, without a warning
+FLATTEST = 1e-5  # physics: least range of heights over the shorter side without a warning, that of a polished wafer
+OBLONG = 1.5  # largest ratio of the sides of a pixel without a warning; most instruments have squares
+
+
+def describe_treatment(prepared: "Prepared") -> list[str]:
+    """Return sentences on how a map was prepared."""
+    part, cut, done, size = prepared.part, prepared.cut, prepared.treated, prepared.size
+    (ny, nx), (lx, ly), odd = cut.shape, (quantity(length, "m", 4) for length in size), int(done.outliers.sum())
+    lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
+    if done.missing:
+        lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / cut.size)}) were filled")
+    if odd and part.outliers == "clip":
+        lines.append(f"road: outliers set to the median of their neighbours: {odd}")
+    if part.short_wavelength:
+        lines.append(
+            f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were removed (ideal low-pass)"
+        )
+    return lines
+
+
+def describe_line(part: jobs.Topography, line: "Map") -> str:
+    """Return a sentence on the random surface that is made from the line scan `line`."""
+    length = quantity(line.size[0], "m", 4)
+    return (
+        f"road: {part.path.name} is a line scan of {line.heights.size} points over {length}; the surface is a random "
+        "isotropic one with its spectrum (C1D)"
+    )
+
+
+WARN_LARGE_MAP = Kind("large map", "{file}: the map is {lx:.4g} x {ly:.4g} m; are lengths in m?")
+WARN_NEAR_POINTS = Kind(
+    "near points", "{file}: the spacing of points is {dx!m}, less than the size of atoms; is the unit right?"
+)
+WARN_FLAT_MAP = Kind(
+    "flat map",
+    "{file}: the map is {lx!m} x {ly!m}, and its heights differ by {span!M} only; do heights and lengths have the "
+    "right units?",
+)
+WARN_OBLONG_POINTS = Kind(
+    "oblong points",
+    "{file}: the spacing of points is {dx!m} along x and {dy!m} along y; is the order of x and y right?",
+)
+
+
+def doubt_sizes(prepared: "Prepared") -> Iterator[Doubt]:
+    """Yield warnings about the size of a map whose units may be confused."""
+    found, name = prepared.whole, prepared.part.path.name
+    (ny, nx), (lx, ly) = found.heights.shape, found.size
+    dx, dy = lx / nx, ly / ny
+    span = float(np.nanmax(found.heights) - np.nanmin(found.heights))
+    if max(lx, ly) > LARGEST:
+        yield WARN_LARGE_MAP("surface", {"file": name, "lx": lx, "ly": ly})
+    if max(dx, dy) < SMALLEST:
+        yield WARN_NEAR_POINTS("surface", {"file": name, "dx": dx})
+    if 0.0 < span < FLATTEST * min(lx, ly):
+        yield WARN_FLAT_MAP("surface", {"file": name, "lx": lx, "ly": ly, "span": span})
+    if max(dx, dy) > OBLONG * min(dx, dy):
+        yield WARN_OBLONG_POINTS("surface", {"file": name, "dx": dx, "dy": dy})
+
+
+WARN_OUTLIERS = Kind(
+    "outliers",
+    "{count} points of the map differ from their neighbours by more than {deviations:g} times the median "
+    "deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, and they carry load; "
+    "if they are no part of the surface, give outliers: clip{nodata}",
+)
+
+
+def doubt_outliers(prepared: "Prepared") -> Iterator[Doubt]:
+    """Yield a warning about outliers, if there are any and they are kept."""
+    from ..job import measured_maps
+    from ..physics.surface_statistics import surface_statistics
+
+    odd, cut = prepared.treated.outliers, prepared.cut
+    if not odd.any() or prepared.part.outliers == "clip":
+        return
+    slope, without = (
+        surface_statistics(measured_maps.treat(heights, "tilt", "smooth").heights, prepared.size).rms_slope
+        for heights in (cut, np.where(odd, np.nan, cut))
+    )
+    furthest = cut[odd][np.argmax(np.abs(cut[odd] - np.nanmedian(cut)))]
+    count = int(np.count_nonzero(cut == furthest))
+    repeated = f"; {quantity(furthest, 'm', 4)} occurs {count} times" if count > 1 else ""
+    nodata = ", or nodata: NUMBER if one number marks missing points" if prepared.part.nodata is None else ""
+    numbers = {
+        "nodata": nodata,
+        "count": int(odd.sum()),
+        "deviations": measured_maps.OUTLIER,
+        "slope": slope,
+        "without": without,
+    }
+    yield WARN_OUTLIERS("surface", {**numbers, "repeated": repeated})
