@@ -2,7 +2,8 @@
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -67,6 +68,8 @@ class SweepRun:
         same time, but no other program. So do signals and the end of the wall time. The file `stop` also stops other
         programs and is not removed. The same command continues the sweep.
         """
+        directory = _directory(self.cases)
+        new = [path for path in (directory / CASES, directory, *directory.parents) if not path.exists()]
         with Signals().noted() as signals:  # also on waiting ranks, whose end would end the others
             ends = self._take(_deal(chosen, self.groups), signals)
             found = self.groups.from_all((ends, self._refusals, self.doubts.kinds))
@@ -74,16 +77,16 @@ class SweepRun:
         refused = set(codes) == {BAD_INPUT}
         if self.groups.root:
             self.stop.forget_own()
-            refusals = {number: reason for _, some, _ in found for number, reason in some.items()}
-            begun = not refused or (_directory(self.cases) / outputs.SWEEP.table).is_file()
-            if refusals and self.runs and begun:  # nothing is written if no case has ever run
-                for number, reason in refusals.items():
-                    sweep_table.fail(self.cases[number], reason)
-                self._collect()
+            if refused and not (directory / outputs.SWEEP.table).is_file():  # nothing is written if no case ever ran
+                with suppress(OSError):
+                    for path in new:
+                        path.rmdir()
+            else:
+                self._record_refusals({number: reason for _, some, _ in found for number, reason in some.items()})
             for text in self.doubts.summary([kinds for *_, kinds in found]):
                 print_line(f"warning: {text}", sys.stderr)
             if STOPPED_EARLY not in codes and not self.quiet and not refused:
-                print_line(f"results of all cases: {Results(_directory(self.cases), 'sweep').points}")
+                print_line(f"results of all cases: {Results(directory, 'sweep').points}")
             elif STOPPED_EARLY in codes and self.groups.count > 1 and not self.quiet:
                 print_line("stopped early; run again to go on")
             if self.runs and STOPPED_EARLY not in codes and len(chosen) > 1:
@@ -91,6 +94,13 @@ class SweepRun:
         if STOPPED_EARLY in codes:
             return STOPPED_EARLY
         return BAD_INPUT if refused else FAILED if {FAILED, BAD_INPUT} & set(codes) else DONE
+
+    def _record_refusals(self, refusals: Mapping[int, str]) -> None:
+        """Record that cases were refused, by their numbers, if `act` runs them; root only."""
+        if refusals and self.runs:
+            for number, reason in refusals.items():
+                sweep_table.fail(self.cases[number], reason)
+            self._collect()
 
     def _report_errors(self, chosen: Sequence[Case]) -> None:
         """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy; root only."""
