@@ -12,7 +12,7 @@ included, is left out.
 Each scene becomes a file with all observations of its steps. Constants can be fitted and assessed from these files
 without another run: `--figures` estimates all errors anew. `coverage.md` has the tables and each miss by name,
 `coverage.png` estimates over true errors. Constants were fitted to scenes below 760; later scenes are for validation.
-It judges AREA, STILL, IDENTICAL, VIEWS, STEADY_AREA, LOST, FREE_LOST, ENERGY and PULL_OFF of `march.constants`.
+It judges AREA, STILL, IDENTICAL, VIEWS, STEADY_AREA, LOST, FREE_LOST, ENERGY and PULL_OFF of `march.budget`.
 The exit code is 1 if less than 95 % of the later scenes are within the requested accuracy, or report that they are not.
 """
 

@@ -10,7 +10,7 @@ of the error budget with the true error by these steps: its median over the erro
 is at least the error, for friction (if the error by the mesh is below AGREE) and for the area. The third is for chosen
 steps: operator calls, errors, and how often the errors of mu_dyn and mu_max are within the estimates of the run.
 
-The constants of `march.constants` that name this script are judged by the second table: PASSING and LINEAR_PASSING by
+The constants of `march.time_error` that name this script are judged by the second table: PASSING and LINEAR_PASSING by
 slides, MANY_WAVES by full contact, LINEAR_PAIR, EQUAL_DIFFERENCE and PAIR_SHARE by rests and by slides with two
 velocities, EULER, EULER_AREA and TIME_AREA by all. Results are on the manual's pages `method` and `accuracy`.
 """

@@ -7,7 +7,7 @@ The marches are those of `march_errors`, with steps of one cell on one mesh, so 
 each tolerance the table has the median of true errors, and of the part `solver` of the error budget over them with the
 range of 90 % of the steps, and the share of the steps in which it is at least the true error. Rows `lossless` have
 friction of the same marches if the body loses FAINT times as much. SOLVER, SOLVER_AREA, PENETRATING and NOISE
-(`lossless`) of `march.constants` are judged by it; an estimate grows in proportion to its constant.
+(`lossless`) of `march.budget` are judged by it; an estimate grows in proportion to its constant.
 """
 
 import sys

@@ -24,8 +24,7 @@ from ..physics.body import BodyMemory, Trial, remembers, states_errors
 from ..physics.energy import EnergyMemory
 from ..physics.motion import friction_by_energy
 from ..physics.records import Entry, Measures, RunPart, Saved, Units, part_of, with_part
-from .budget import ErrorBudget, ErrorSums, estimate
-from .constants import ENERGY
+from .budget import ENERGY, ErrorBudget, ErrorSums, estimate
 from .controller import StepTolerance, TolerancePart
 from .embedded import IntegratorDifference
 from .laws import choose_contact_law

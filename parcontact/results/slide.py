@@ -48,7 +48,7 @@ from ..effects.branches import relaxation_of
 from ..files import files, outputs
 from ..job import Initial, Job, Ramp, Stage, Swing
 from ..job.listing import answers
-from ..march.constants import SOLVER_AREA
+from ..march.budget import SOLVER_AREA
 from ..parallel.slab import Array
 from ..physics.prony import complex_modulus, discrete_modulus
 from ..printed import per_cent, quantity, stated_error, with_error

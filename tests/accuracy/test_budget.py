@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from parcontact.march import constants
+from parcontact.march import budget, time_error
 from parcontact.march.budget import ErrorSums, estimate
 from parcontact.march.time_error import RunProperties, StepObservation
 
@@ -17,7 +17,9 @@ SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02, difference=4e-4)
 
 def test_fitted_constants_of_the_budget_name_what_judges_them() -> None:
     """A script or a test that exists; a script also names the constant."""
-    fits = {name: fit.found_by for name, fit in vars(constants).items() if isinstance(fit, constants.Fit)}
+    stated = vars(time_error) | vars(budget)
+    fits = {name: fit.found_by for name, fit in stated.items() if isinstance(fit, time_error.Fit)}
+    assert fits
     for name, found_by in fits.items():
         text = (ROOT / found_by).read_text()
         assert found_by.startswith("tests") or re.search(rf"\b{name}\b", text), name
@@ -79,8 +81,8 @@ def test_steps_that_last_no_time_count_where_none_does() -> None:
     stills = [StepObservation(error, 0.0, 0.1, 0.1) for error in (1e-3, 2e-3, 6e-3, 8e-3)]
     *loads, lasting = (estimate(KNOWN, still) for still in stills)
     summary = ErrorSums()
-    for budget in loads:
-        summary = summary.plus(budget, 0.0, 0.0)
+    for of_load in loads:
+        summary = summary.plus(of_load, 0.0, 0.0)
     assert summary.friction is None
     assert summary.area is not None
     assert summary.area.solver == pytest.approx(sum(budget.area.solver for budget in loads) / 3.0)

@@ -28,7 +28,7 @@ from ...job import limits
 from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Sphere, Wave
 from ...job.yaml_text import Fault
-from ...march.constants import ENERGY
+from ...march.budget import ENERGY
 from ...parallel.slab import Array
 from ...physics.body import remembers
 from ...physics.records import Entry, Measures, Saved, Units

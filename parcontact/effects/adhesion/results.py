@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...march.constants import PULL_OFF, Fit
+from ...march.budget import PULL_OFF
+from ...march.time_error import Fit
 from ...printed import quantity
 from ...results.results import Results
 from .section import law_of

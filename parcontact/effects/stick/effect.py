@@ -52,7 +52,7 @@ import numpy as np
 
 from ...columns import added_by
 from ...contact.preconditioner import grids_for
-from ...march.constants import Fit
+from ...march.time_error import Fit
 from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import BodyMemory, MovedHeights, surface_of

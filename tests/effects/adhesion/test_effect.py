@@ -16,7 +16,7 @@ from parcontact.errors import InputError
 from parcontact.files.sweep_warnings import sentences_of
 from parcontact.job import Job
 from parcontact.march import sanity
-from parcontact.march.constants import ENERGY
+from parcontact.march.budget import ENERGY
 from parcontact.march.mesh import load, load_cases
 from parcontact.march.scene import set_up
 from parcontact.parallel.slab import Slab
