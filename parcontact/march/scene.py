@@ -36,8 +36,7 @@ from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..printed import quantity
 from .choices import Choices, choices
-from .controller import Controller
-from .embedded import EmbeddedPair
+from .controller import Controller, EmbeddedPair
 from .rigid_surface import HeightRange, Remarks, heights_of, make_surface, outline_surface, shortest_measured
 from .time_error import RunProperties, properties_of
 

@@ -25,8 +25,7 @@ from ..physics.energy import EnergyMemory
 from ..physics.motion import friction_by_energy
 from ..physics.records import Entry, Measures, RunPart, Saved, Units, part_of, with_part
 from .budget import ENERGY, ErrorBudget, ErrorSums, estimate
-from .controller import StepTolerance, TolerancePart
-from .embedded import IntegratorDifference
+from .controller import IntegratorDifference, StepTolerance, TolerancePart
 from .laws import choose_contact_law
 from .scene import Scene
 from .time_error import RunProperties, StepObservation, error_of_rise, time_error

@@ -27,7 +27,7 @@ A quadratic step also follows the bend of the motion. In full contact the error 
 <L> plus theta^4/75 (`prony.discrete_modulus`), and again MANY_WAVES times as large. Edges leave an error of third
 order, PASSING x^3.
 
-The second estimate is the embedded pair (`embedded`), which shows jumps, changes of load, and creep. For a quadratic
+The second estimate is the embedded pair (`controller`), which shows jumps, changes of load, and creep. For a quadratic
 step it is the difference to a linear step. The pair of a linear step differs in second order if all branches are slow,
 and in first order if some are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of
 the pair counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the

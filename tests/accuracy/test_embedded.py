@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from stepping_body import HeldBody
 
-from parcontact.march.embedded import SAMPLED_ROWS, EmbeddedPair
+from parcontact.march.controller import SAMPLED_ROWS, EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import Prony

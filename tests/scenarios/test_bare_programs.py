@@ -11,7 +11,7 @@ from parcontact.contact.solver import ContactSolver
 from parcontact.job import Job
 from parcontact.job.history import Timeline
 from parcontact.march import choices, scene
-from parcontact.march.embedded import EmbeddedPair
+from parcontact.march.controller import EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
