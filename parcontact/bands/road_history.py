@@ -1,7 +1,7 @@
 """History of a surface in bands: friction and area as functions of time, from rest and after changes of velocity.
 
 Every band is marched through the whole history at every rung of its ladder, from the finest band to the coarsest, with
-the closing of all finer bands at each instant as the law of its interface (`road_march`). Then the load is distributed
+the closing of all finer bands at each instant as the law of its interface (`BandMarch`). Then the load is distributed
 over the bands at each instant as in steady sliding (`cascade`, `road_sliding`), with errors of the same kind: half of
 the rungs are marched on hard walls, too, for the error of the method.
 
@@ -14,28 +14,103 @@ import copy
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..contact.problem import InterfaceLaw
+from ..contact.problem import Box, Constraint, InterfaceLaw
 from ..effects.branches import relaxation_of
 from ..errors import RunError
 from ..files import outputs
 from ..files.recorder import StepRow
 from ..job import Job
-from ..march.steady import Point
+from ..job.history import Step
+from ..march.laws import ClosingLaw
+from ..march.loop import March, run_steps
+from ..march.scene import build_on
+from ..march.steady import Point, start_march
 from ..parallel.slab import Array, Slab
 from ..physics.records import Measures
-from .band import NODES, PressureLadder, Rung
+from .band import NODES, Band, PressureLadder, Rung, rung_errors
 from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
 from .cascade import Cascade, Results, mean_rungs
 from .choice import FEWEST
-from .road_march import BandMarch, instant_of
 from .road_sliding import BandOutcome, RoadSliding, _sums
+
+LawAt = Callable[[Place], Constraint]
+NOTHING: Array = np.zeros(0)
+NONE: Array = np.zeros(1)  # of what only steady states have
+
+
+class BandMarch:
+    """Marches of one band: calculations step by step through its history. A march gives a `Rung`, whose numbers have a
+    first axis over the places of `clock`: the track under this pressure. Its friction is along +x, by slopes."""
+
+    def __init__(self, band: Band) -> None:
+        self.band = band
+        self.scene = build_on(band.setup)
+        self.scene.probe = band.probe
+
+    def march(
+        self, pressure: float, law: LawAt | None, place: Callable[[Step], Place], below: PressureLadder | None
+    ) -> Rung:
+        """Return the results at all places of the history under a mean pressure [Pa], with the distribution of pressure
+        over `below`, the ladder of the next finer band. Without a `law` finer bands are absent. Raises RunError if a
+        step fails."""
+        scene, rows = self.scene, list[Rung]()
+        scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
+        march = self._begin(pressure, law)
+        if self.band.setup.job.initial.state == "steady":
+            rows.append(self._measure(march, pressure, below))
+        steps = (step._replace(load=pressure) for step in march.timeline())  # all: the clock has a place for each
+        run_steps(march, [lambda march: rows.append(self._measure(march, pressure, below))], steps)
+        return track_of(rows)
+
+    def _begin(self, pressure: float, law: LawAt | None) -> March:
+        scene, band, initial = self.scene, self.band, self.band.setup.job.initial
+        if initial.state == "virgin":
+            return start_march(scene)
+        band.slide(initial.velocity)
+        contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else Box())
+        seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
+        measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
+        facts = {"certificate": contact.certificate, "operator_calls": contact.iterations}
+        return start_march(scene, contact, measures=measures, **facts)
+
+    def _measure(self, march: March, pressure: float, below: PressureLadder | None) -> Rung:
+        row, last, units, grid = march.row, march.state.contact.last, self.scene.units, self.scene.choices.grid
+        m, pressures = row.measures, last.pressure * (last.alpha * units.pressure)
+        weights, lost = below.weights_of_rungs(pressures) if below is not None else (NOTHING, 0.0)
+        friction = -m.force_x / (pressure * grid.lx * grid.ly)
+        values: Any = (
+            *(pressure, friction, friction, m.contact_area, m.contact_area_corrected, m.approach, m.max_pressure),
+            *(weights, lost, NONE, {}, rung_errors(row.errors)),
+            *(row.certificate.worst, row.certificate.penetration, float(row.operator_calls)),
+        )
+        return Rung(*values)
+
+
+def track_of(rows: Sequence[Rung]) -> Rung:
+    """Return the results at successive places of a history as one `Rung`, whose arrays have the place as first axis."""
+    values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
+    return Rung(**values, found={})
+
+
+def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
+    """Return the results of `track` interpolated between two places; friction is taken along `sign` times x."""
+
+    def between(values: Any) -> Any:
+        return (1.0 - share) * values[before] + share * values[after]
+
+    found = Rung(**{name: between(getattr(track, name)) for name in NAMES}, found={})
+    return replace(found, friction=sign * found.friction, friction_slopes=sign * found.friction_slopes)
+
+
+NAMES = tuple(each.name for each in fields(Rung) if each.name != "found")
+
 
 T = TypeVar("T")
 INSTANTS = 50  # accuracy: instants of a stage with a row, equally spaced in the logarithm of slip or time
