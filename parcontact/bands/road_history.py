@@ -34,8 +34,7 @@ from ..march.scene import build_on
 from ..march.steady import Point, start_march
 from ..parallel.slab import Array, Slab
 from ..physics.records import Measures
-from .band import NODES, Band, PressureLadder, Rung, rung_errors
-from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
+from .band import BEFORE, NODES, SETTLED, Band, BandClock, Place, PressureLadder, Rung, rest_step, rung_errors
 from .cascade import Cascade, Results, mean_rungs
 from .choice import FEWEST
 from .road_sliding import BandOutcome, RoadSliding, _sums
