@@ -10,10 +10,10 @@ the load is conserved. Functions linear in p would conserve the load, too, but u
 
 In a history each stage of the job becomes stages whose steps follow the cell and the waves of the band. After a change
 of velocity the steps of a slide grow from a small part of a cell to half a cell. Then each has exactly half a cell, so
-that solves start from the pressures of the step before the last, moved by a cell (`march.laws`). After a slip of SETTLED
-longest waves a band slides steadily, and makes no steps until the next stage: fine bands settle within micrometres. So
-a band's own history is shorter than the job's, and a step is placed by the number of the job's stage and by the time
-since this stage began.
+that solves start from the pressures of the step before the last, moved by a cell (`march.laws`). After a slip of
+SETTLED times the longest wave a band slides steadily, and makes no steps until the next stage: fine bands settle within
+micrometres. So a band's own history is shorter than the job's, and a step is placed by the number of the job's stage
+and by the time since this stage began.
 """
 
 from __future__ import annotations
