@@ -49,6 +49,7 @@ SMALL = {
     ),
     "error_coverage": Small(["--scenes", "2", "--from", "15"], r"(?s)fitted: 2 \| area .*2 scenes; written: ", (0, 1)),
     "fit_errors": Small(["--rubbers", "4"], r"(?m)^time +upper end +2 "),
+    "fuzz_jobs": Small(["--jobs", "4"], r"(?m)^4 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_faults.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "march_errors": Small(["--marches", "1"], r"(?m)^exponential +0.01 +[0-9.]+ "),
