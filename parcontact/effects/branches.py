@@ -1,23 +1,30 @@
-"""Branches of a material: its relaxation function, and branches without a map, with the error that this causes.
+"""Branches of a material: its relaxation function, and branches that need no map.
 
-With the notation of `physics.body`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to
-the stress of a step. Two approximations save its map:
+With the notation of `physics.body`, the stress h of a branch of modulus G and relaxation time tau changes in a step dt
+by `h <- decay h + gain du`, where du is the change of the displacement. `physics.prony.coefficients` gives `decay` [-]
+and `gain` [Pa]. Two approximations save the map of h:
 
-    memoryless  tau far below the shortest step dt: `decay h` is dropped, and `gain du` stays
-    frozen      tau far above the duration T of the history: h = G u, a part of the spring
+    memoryless  tau is far below the shortest step dt: `decay h` is left out, and `gain du` stays
+    frozen      tau is far above the duration T of the history: h = G u, so that the branch is a part of the spring
 
-Bounds. A displacement wave u that passes with the frequency w has the modulus M = stress/u. An error |dM| changes
-friction by |dM|/G''(w), relatively, and the contact area, which follows 1/|M|, by |dM|/|M|; both are added. The
-modulus of a wave that does not pass is at least G(T).
+This causes an error, for which the module gives an upper bound. A displacement wave u that passes with the frequency w
+has the modulus M = stress/u. An error |dM| of this modulus changes friction by the share |dM|/G''(w), and the contact
+area, which is proportional to 1/|M|, by the share |dM|/|M|. The bound is the sum of both. The modulus of a wave that
+does not pass is at least the relaxation modulus G(T).
 
-    memoryless  |dM| <= decay |h|/u,  |h|/u <= G min(w tau, 1) in sliding, and <= G after a jump. The branch alone
-                has a G'' of half of G min(w tau, 1/(w tau)), and a step has at least the modulus `gain`, so that
-                error = decay (2 max(1, pi tau/dt) + G/gain),  w <= pi/dt, in any material
-    frozen      |dM| = (G/tau) |integral_0^t exp((s - t)/tau) u ds|/u <= G min(1 - exp(-T/tau), n pi/(w tau)), as each
-                of n stages begins with any phase of a wave
-                error = (|dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt, if the surface slides)
+For a memoryless branch |dM| <= decay |h|/u. In sliding |h|/u is at most G min(w tau, 1), and after a jump at most G.
+The G'' of the material is at least that of the branch alone, which is at least G min(w tau, 1/(w tau))/2, and the
+modulus in a step is at least `gain`. Since w <= pi/dt, the bound for any material is
 
-A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u.
+    error = decay (2 max(1, pi tau/dt) + G/gain)
+
+For a frozen branch each of n stages may begin with any phase of a wave, so that
+
+    |dM| = (G/tau) |integral_0^t exp((s - t)/tau) u ds|/u <= G min(1 - exp(-T/tau), n pi/(w tau))
+    error = |dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt
+
+The second term of the error counts only if the surface slides; a wave slower than 1/T does not pass within the history.
+A frozen branch can get a map at any time, since the map is G u.
 """
 
 import math
@@ -77,14 +84,18 @@ def highest_temperature_of(material: Material) -> float:
 
 
 def factor_at(material: Material, rise: float) -> float:
-    """Return the ratio of a material's relaxation times after a temperature rise [K] to those before it [-]. Raises
-    InputError outside the range of its shift."""
+    """Return the relaxation times of a material after a temperature rise [K], divided by its relaxation times before
+    the rise [-]. Raises InputError outside the range of its shift."""
     return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)
 
 
 class TimeScales(NamedTuple):
-    """Time scales of a history: duration and shortest step [s], number of stages with a duration, and whether the load
-    `jumps` after the start, the surface `slides`, and the history starts in `steady` sliding."""
+    """Time scales of a history.
+
+    `duration` and `shortest` are the duration of the history and its shortest step [s], and `stages` is the number of
+    stages with a duration. `jumps` is True if the load jumps after the start, `slides` if the surface slides, and
+    `steady` if the history starts in steady sliding.
+    """
 
     duration: float
     shortest: float
@@ -129,8 +140,12 @@ class FoldedBranches:
 def fold_branches(
     prony: Prony, scales: TimeScales, integrator: Integrator, allowed: float, reason: str = ""
 ) -> FoldedBranches:
-    """Return which branches of a material [Pa, s; in normal form] have maps: all if there is a `reason`; otherwise all
-    but the fastest and the slowest, as many as keep the sum of their errors at `allowed` or below."""
+    """Return which branches of a material have maps.
+
+    If there is a `reason`, all have maps. Otherwise the fastest branches are memoryless and the slowest are frozen, as
+    many of them as possible while the sum of their errors is at most `allowed`. Moduli are in Pa, and relaxation times,
+    in s, rise and differ (`physics.prony.normal_form`).
+    """
     without_memory, as_spring = memoryless_errors(prony, scales, integrator), frozen_errors(prony, scales)
     fast = (np.cumsum(without_memory) <= MEMORYLESS_SHARE * allowed) & (not reason)
     left = allowed - float(without_memory[fast].sum())
@@ -141,7 +156,8 @@ def fold_branches(
 
 
 def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) -> Array:
-    """Return the relative error of each branch if it is memoryless; infinite if a jump depends on its memory."""
+    """Return the relative error that each branch causes if it is memoryless. All errors are infinite if the load jumps
+    after the start, since the stress after a jump depends on the memory of the branches."""
     if scales.jumps or not scales.shortest:
         return np.full_like(prony.moduli, np.inf)
     decay, gain, _ = coefficients(prony, integrator, scales.shortest)
@@ -150,7 +166,8 @@ def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) 
 
 
 def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
-    """Return the relative error of each branch if it is a spring; infinite after steady sliding, where h is not G u."""
+    """Return the relative error that each branch causes if it is treated as a spring. All errors are infinite for a
+    history that starts in steady sliding, where the stress of a branch is not G u."""
     if scales.steady:
         return np.full_like(prony.moduli, np.inf)
     relaxed = prony.moduli * -np.expm1(-scales.duration / prony.relaxation_times)

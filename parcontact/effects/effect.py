@@ -42,8 +42,11 @@ End = Literal["equilibrium", "detached", "opened", "open"]
 
 
 class PreviousPressure(NamedTuple):
-    """The pressure after a step and the position of the surface [m]. The pressure is `alpha p`, with p the map
-    `pressure`, and is unknown if alpha is 0."""
+    """The pressure after a step, and the position of the surface [m] at that time.
+
+    The pressure is `alpha` times the map `pressure`, in the run's unit of pressure. `alpha` is the modulus of the body
+    in that step; 0 means that the pressure is not known.
+    """
 
     pressure: Array
     alpha: float = 0.0
@@ -52,9 +55,10 @@ class PreviousPressure(NamedTuple):
 
 @dataclass(frozen=True)
 class PreviousContacts:
-    """Memory of earlier contacts: the last pressures, the newest first, and the last approach d.
+    """Contacts of earlier steps: their pressures, the newest first, and the last approach.
 
-    A history of single solves stores one pressure, other histories two or more. `spare` receives the next pressure.
+    In a history of single solves only the last pressure is kept, in other histories two or more. The solver writes the
+    pressure of the next contact into the map `spare`.
     """
 
     pressures: tuple[PreviousPressure, ...]
@@ -68,16 +72,17 @@ class PreviousContacts:
 
 @dataclass(frozen=True)
 class SolvedContact(Generic[Remembered]):
-    """The contact of a step, the law's memory after it, and a map `touching`, not 0 where the surfaces touch.
+    """The solution of a step: the contact, the memory of the law after the step, and a map `touching`, which is not 0
+    where the surfaces touch.
 
-    `numbers`: further results of the law, by name. `pull`: force of all tension [N]. `least_load`: loads [N] up to this
-    one are errors of the solver. `snapped`: the contact passed through states without equilibrium. `remark`: a sentence
-    for run.log, or ''. `end` is one of
+    `numbers` are further results of the law, by their names. `pull` is the force of all tension [N]. Loads of at most
+    `least_load` [N] cannot be told from errors of the solver. `snapped` is True if the contact passed through states
+    without equilibrium. `remark` is a sentence for run.log, or ''. `end` is one of
 
     * "equilibrium";
-    * "detached": no equilibrium was left;
-    * "opened": the run continues with the surfaces far from each other;
-    * "open": a step after the surfaces have opened.
+    * "detached": the surfaces separated, since no equilibrium in contact was left;
+    * "opened": the surfaces separated in this step, and the run continues;
+    * "open": the surfaces had separated in an earlier step.
     """
 
     contact: Contact
@@ -92,14 +97,17 @@ class SolvedContact(Generic[Remembered]):
 
     @property
     def loaded(self) -> bool:
-        """True if there is pressure or tension."""
+        """True if the surfaces press or pull each other anywhere."""
         return self.least_load < math.inf
 
 
 class EdgeMotion(NamedTuple):
-    """Motion of a contact in a step: `front` is the motion of its edges [half process zones], `untouched` is True if
-    nothing touches or is under tension before and after the step, and `begins` if a contact that attracts begins or
-    ends."""
+    """Motion of a contact in a step.
+
+    `front` is the distance by which the edges of contact moved, divided by half the length of the process zone of
+    adhesion. `untouched` is True if nothing touches or is under tension, neither before nor after the step. `begins` is
+    True if surfaces that attract each other touch either before or after the step, but not both.
+    """
 
     front: float = 0.0
     untouched: bool = False
@@ -117,14 +125,15 @@ NEVER = -1.0  # a time [s] in a checkpoint
 
 
 def entries_of_end(end: Detached | None, job: Any) -> dict[str, Entry]:
-    """Return the checkpoint entries of a detachment, which is None before one, for a job."""
+    """Return the checkpoint entries of a job's law for the detachment `end`; `end` is None as long as the surfaces have
+    not detached."""
     time, load = end or (NEVER, 0.0)
     return {"detached at": Entry(time, 1.0, "s"), "detached under": Entry(load), "history": Entry(_mark(job))}
 
 
 def end_in(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment that a checkpoint of a law holds; None without one, or for another
-    history."""
+    """Return the time and the load of the detachment in a checkpoint. Return None if the surfaces have not detached, or
+    if the checkpoint belongs to a job with another history."""
     if "detached at" not in saved or saved["detached at"] == NEVER or float(saved["history"]) != _mark(job):
         return None
     return Detached(float(saved["detached at"]), float(saved["detached under"]))
@@ -139,15 +148,16 @@ UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}
 
 
 def nothing_holds(control: str, load: float) -> str:
-    """Return a sentence: the surfaces detach under a prescribed load."""
+    """Return a sentence that reports the load under which the surfaces detach: `control` is pressure, force or
+    approach, and `load` is its value in SI units."""
     return f"the surfaces detach under a {control} of {load:g}{UNITS_OF_LOADS[control]}"
 
 
 class ContactLaw(Protocol[Memory]):
-    """A contact law, a part of the run. Methods are collective.
+    """The interface of a contact law, which solves the contact of each step and has a memory. Methods are collective.
 
-    The usual law only bounds the pressure. A law that extends it may have a method `upon`, which takes the usual law
-    and returns the extended law.
+    The usual law only bounds the pressure. A law that builds on the usual law has a method `upon`, which takes the
+    usual law and returns the law to be used.
     """
 
     may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
@@ -162,18 +172,21 @@ class ContactLaw(Protocol[Memory]):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[Memory]:
-        """Solve the contact of a step, and put the pressure into the spare map of `past`. `memory`, `past` and `before`
-        are the law's memory, the contacts and the measures of the step before. A `tolerance` of None means the job's.
-        The result has a `failure` if the solve failed."""
+        """Solve the contact of a step, and put its pressure into the map `past.spare`.
+
+        The state before the step is given by the law's `memory`, by the contacts `past` and by the measures `before`.
+        If `tolerance` is None, the job's tolerance is used. If the solve fails, `contact.failure` of the result states
+        why.
+        """
 
     def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return the motion of the contact in a step from its measures before and after it."""
+        """Return the motion of the contact in a step, from its measures `before` the step and `now`, after it."""
 
     def gap(self, memory: Memory) -> Array | None:
         """Return the map of the gap if the gap is the unknown, else None."""
 
     def detached(self, memory: Memory) -> Detached | None:
-        """Return time and load of the detachment; None before it."""
+        """Return the time and the load at which the surfaces detached; None if they have not."""
 
     def with_end(self, memory: Memory, end: Detached) -> Memory:
         """Return the memory with the detachment `end` added."""
@@ -196,7 +209,7 @@ SINGLE, BY_THEORY = "single precision", "Persson's theory"
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision about an effect: `on` or off, and the reason `why` in a few words."""
+    """The decision about the effect called `name`: True in `on` if it acts, and the reason `why` in a few words."""
 
     name: str
     on: bool
@@ -205,10 +218,16 @@ class Decision:
 
 @dataclass(frozen=True)
 class Sheared:
-    """Effect of tractions along the surface in a step: the measures including tractions, their force [N] on the rigid
-    surface, and the energy lost in slip [J]. With heat the map `slipping` is proportional to the power of slip; at
-    rest, or if nothing slips, to the bounds of tractions. Tractions have the relative errors `error` of their solve,
-    `time` of the step length, and `mesh` of the stiffness of spots; a `share` of them has the error of the area."""
+    """Results of tractions along the surface in a step.
+
+    `measures` are the measures of the step including tractions. `force` [N] is the force of all tractions on the rigid
+    surface, and `lost` [J] the energy lost in slip. The map `slipping` says where heat of slip is released: it is
+    proportional to the power of slip, or, if nothing slips, to the largest traction that the interface can bear.
+
+    The last four numbers are relative errors of tractions, and a share: `error` comes from their solve, `time` from the
+    length of the step, and `mesh` from the stiffness of contact spots. The error of the contact area affects only the
+    `share` of the tractions.
+    """
 
     measures: Measures
     force: Vector
@@ -222,15 +241,14 @@ class Sheared:
 
 @dataclass(frozen=True)
 class Instant:
-    """A step just made, in the run's units unless stated; maps have the shape (ny_loc, nx) and are valid until the next
-    step.
+    """A step just made. Values are in the run's units unless a unit is stated. Maps have the shape (ny_loc, nx) and are
+    valid until the next step.
 
-    The pressure is `modulus pressure`, `displacement` is the displacement of the body, and `touching` is not 0 where
-    the surfaces touch. `before` and `measures` are the measures of the step before and of this step. In the step the
-    surface moved by `moved` [m], and the stored plus dissipated energy of the body changed by `gained` [J], NaN without
-    energies. Edges of a contact that attracts moved by `front` half process zones; `untouched` is True if nothing
-    touched or was under tension before and after the step. `error_friction` is the estimated relative error of
-    friction, infinite without friction.
+    The pressure is the number `modulus` times the map `pressure`. `displacement` is the displacement of the body, and
+    `touching` is not 0 where the surfaces touch. `before` are the measures before the step, and `measures` those after
+    it. In the step the surface moved by the vector `moved` [m], and the sum of the stored and the dissipated energy of
+    the body changed by `gained` [J], which is NaN if energies are not computed. `front` and `untouched` are those of
+    `EdgeMotion`. `error_friction` is the estimated relative error of friction, infinite without friction.
     """
 
     step: Step
@@ -264,9 +282,12 @@ class Instant:
 
 @dataclass(frozen=True)
 class Changes(Generic[Remembered]):
-    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', and `states_errors`, False if
-    errors cannot be stated across the step. `turned` is the change of the mean traction over the mean bound of
-    traction."""
+    """Changes that an effect makes in a step.
+
+    `memory` is its memory after the step, and `remark` a sentence for run.log, or ''. `states_errors` is False if
+    errors cannot be stated across this step. `turned` is the change of the mean traction, divided by the mean of the
+    largest traction that the interface can bear.
+    """
 
     memory: Remembered
     remark: str = ""
@@ -277,16 +298,22 @@ class Changes(Generic[Remembered]):
 
 class Effect(Protocol[Memory]):
     """Base class of effects, without memory. An object is made from a `Scene` only if the job asks for the effect, and
-    is a part of the run. Methods are collective unless stated.
+    takes part in each step of the run. Methods are collective unless stated.
 
-    Optional attributes: `rules`, checks of the whole job; `lifts`, checks of jobs that do not apply with the effect;
-    `stage`, a class of stages with further keys. Optional functions of a job: `doubts` and `facts` yield warnings
-    (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` yields sentences on the waves of a
-    surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes. `changed_material` returns a
-    material that replaces the job's. `response`, also from a unit of length [m], returns the response of another body
-    than a half space (`physics.halfspace.Response`). `why_no_curve` and `why_no_theory` return the reason why a job has
-    no friction curve, or no prediction by Persson's theory, and `why_not_folded` why all branches need maps.
-    `curve_options` yields the requirements of the effect's columns of friction curves (`Column.when`).
+    A class may have further attributes. `rules` are checks of the whole job. `lifts` are checks of the package that are
+    left out if the effect is on. `stage` is a class of stages with further keys.
+
+    A class may also have these functions of a job, all of them optional:
+
+    * `doubts` yields warnings about the section (`doubts.Doubt`, or sentences), and `facts` yields sentences.
+    * `describe_waves` yields sentences on the waves of a surface on one grid, from bins of wavenumbers [rad/m] and
+      their mean square slopes.
+    * `changed_material` returns a material that replaces the job's.
+    * `response` takes the job and the unit of length [m], and returns the response of a body that is no half space
+      (`physics.halfspace.Response`).
+    * `why_no_curve`, `why_no_theory` and `why_not_folded` return a reason, or '': why the job has no friction curve,
+      why Persson's theory cannot predict it, and why each branch of the material needs a map.
+    * `curve_options` yields the options for which friction curves have further columns (`Column.when`).
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job
@@ -304,19 +331,20 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Return the decision whether the job turns the effect on, with its name in checkpoints; equal on all ranks."""
+        """Return the decision whether the job turns the effect on. Its `name` is the effect's name in checkpoints. All
+        ranks must return the same."""
         ...
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the maps that the effect stores in checkpoints and in memory, for `parcontact plan`; the
-        plan counts allocations instead for effects of this package."""
+        """Return the types of the maps that the effect stores in checkpoints and in memory. `parcontact plan` uses them
+        for effects of other packages; for effects of this package it counts allocations."""
         return ()
 
     @staticmethod
     def shear(job: Any) -> Shear | None:
-        """Return the friction of the contact area that the effect adds, in marches and in steady sliding, or None.
-        Forces of all effects are added."""
+        """Return the shear that the effect exerts on the contact area, in marches and in steady sliding, or None. The
+        forces of all effects are added."""
         return None
 
     @staticmethod
@@ -332,7 +360,8 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def sheared_first(job: Any) -> bool:
-        """Return True if the effect shears the contact before it slides, over much less than a wave."""
+        """Return True if the effect shears the contact before it slides, over a distance much smaller than the waves of
+        the surface."""
         return False
 
     @staticmethod
@@ -342,12 +371,12 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the lengths [m] that the effect chooses by the mesh, by the names of their keys."""
+        """Return the lengths [m] that the effect chooses from the mesh, by the names of their keys."""
         return {}
 
     @staticmethod
     def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
-        """Yield warnings about a rough surface with the height `span` from the lowest to the highest point [m]."""
+        """Yield warnings about a rough surface, whose lowest and highest points differ by `span` [m]."""
         yield from ()
 
     @staticmethod
@@ -393,11 +422,11 @@ class Effect(Protocol[Memory]):
         ...
 
     def time_factor(self, memory: Memory) -> float:
-        """Return the ratio of relaxation times after a step to those at the job's temperature. Raises RunError."""
+        """Return the relaxation times after a step, divided by those at the job's temperature. Raises RunError."""
         return 1.0
 
     def work(self, memory: Memory) -> float | None:
-        """Return the work of the load since the start [J]; None if it is the work on the body."""
+        """Return the work of the load since the start [J]; None if it equals the work done on the body."""
         return None
 
     def error_energy(self, memory: Memory) -> float | None:
@@ -405,8 +434,8 @@ class Effect(Protocol[Memory]):
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
-        """Return energies of the body to be added to its energies under pressure, in the unit of the scene, and further
-        losses of work [J]; None without such energies."""
+        """Return energies and losses that the energies of the body under pressure do not contain: energies of the body,
+        in the unit of the scene, and work lost outside the body [J]. Return None if the effect adds nothing."""
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
@@ -415,8 +444,8 @@ class Effect(Protocol[Memory]):
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory that a checkpoint holds, in the run's units, numbers as arrays. Maps have been read into
-        the maps of `entries`."""
+        """Return the memory that a checkpoint holds. Numbers in `saved` are arrays in the run's units. The maps of
+        `entries` have already been filled with the saved maps."""
         return memory
 
 
@@ -494,8 +523,9 @@ def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
 
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Box:
-    """Return the bounds of the pressure, if no effect has a law, in the `unit` [Pa]; pressures are at most `most`
-    units."""
+    """Return the bounds of the pressure for a job whose effects have no contact law. Both the bounds and `most` are in
+    `unit` [Pa]. The upper bound is the hardness of the material; there is none if the material has no hardness, or if
+    it is above `most`."""
     hardness = job.material.hardness
     return Box() if hardness is None or hardness / unit >= most else Box(highest=hardness / unit)
 
