@@ -30,7 +30,8 @@ def compile_loops() -> None:
 
 
 class LeakageColumns(Effect[tuple[float, ...]]):
-    """Columns of leakage: the conductivity K [m^3] of the gap along x and along y, and the critical constriction [m].
+    """Columns of leakage: the conductivity K [m^3] of the gap along x and along y, and the critical constriction [m],
+    which is the smallest gap on the widest path.
 
     The gap is gathered on root, which solves for the flow.
     """
@@ -96,8 +97,8 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
 @dataclass(frozen=True)
 class SealColumns:
-    """Memory of a seal: the values of its columns, the map of the fluid's pressure above ambient [Pa], and whether a
-    warning about inertia was given."""
+    """Memory of the effect `Seal`: the values of its columns, the map of the fluid's pressure above ambient [Pa], and
+    True in `warned` if a warning about inertia was given."""
 
     columns: tuple[float, ...]
     pressure: Array
@@ -105,7 +106,8 @@ class SealColumns:
 
 
 class Seal(LeakageColumns):
-    """Columns and map of a fluid that flows through a seal and carries a part of the load (`seal_law`)."""
+    """Effect of a fluid that flows through a seal and carries a part of the load. Its contact law is
+    `seal_law.SealLaw`, and its map is the pressure of the fluid."""
 
     columns: ClassVar[tuple[str, ...]] = ("flow_x", "constriction", *added_by("leakage.load"))
     fields: ClassVar[tuple[str, ...]] = ("fluid_pressure",)

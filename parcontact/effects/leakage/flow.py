@@ -1,48 +1,49 @@
 """Flow of a fluid through the gap of a contact.
 
-The Reynolds equation for a fluid of viscosity eta between two bodies that touch where the gap g is zero,
+A fluid of viscosity eta flows between two bodies, which touch where the gap g is zero. Its pressure p satisfies the
+Reynolds equation,
 
     div(g^3 grad p) = 0,      flow per width  Q = -(K / 12 eta) grad p,
 
-is solved by finite volumes: each point of the map is a cell, and the conductance of the face between two cells is
-the harmonic mean of their g^3. The pressure is prescribed on two opposite ends of the map. The other two sides are
-periodic or closed. Contact is impermeable. Only cells on a path from end to end are used. Their matrix is factorized
-directly, as g^3 spans many decades and iterations stall. The flow follows from its dissipation, `sum c (p -
-p_neighbour)^2`, which is minimal for the exact pressures, so that their errors enter squared.
+where the second equation defines the conductivity K [m^3] of the whole gap. The first equation is solved by finite
+volumes: each point of the map is a cell, and the conductance c of the face between two cells is the harmonic mean of
+their g^3. The pressure is prescribed on two opposite ends of the map. The other two sides are periodic or closed.
+Contact is impermeable, and only cells on a path from end to end are used. The flow follows from its dissipation, `sum c
+(p - p_neighbour)^2` over all faces. The exact pressures make this sum smallest, so that errors of the pressures enter
+the flow squared.
 
-Half of the cells are eliminated at once, the rest by sparse factors.
+Each cell with fluid has the balance `sum c (p - p_neighbour) = given` over its faces, where the source `given` is 0
+except at an end with prescribed pressure. If the cells are coloured like a checkerboard, a white cell has only black
+neighbours, and its pressure is
 
-In each wet cell with the conductances c of its faces, `sum c (p - p_neighbour) = given`. White cells of a checkerboard
-touch only black cells, so that each is eliminated on its own:
+    p_white = (given + sum c p_black)/sum c.
 
-    p_white = (given + sum c p_black)/sum c,
+This eliminates all white cells, half of the unknowns, and leaves a symmetric matrix for the black cells, with up to
+eight neighbours each. This matrix is factorized directly, since iterations would stall: g^3 spans many decades.
 
-which leaves a symmetric matrix for the black cells, with up to eight neighbours each. This matrix is factorized
-directly.
-
-Fluids are liquids, described by their viscosity, and gases, which expand and slip.
-
-A pressure that falls from p1 to p2 over the length L of a gap of conductivity K drives through a width W the flow
+A fluid is a liquid or a gas, which expands and slips at the walls. A pressure that falls from p1 to p2 over the length
+L of a gap of conductivity K drives through a width W the flow
 
     liquid   Q = K/(12 eta) (p1 - p2) W/L,
     gas      Q = K/(12 eta) (p1^2 - p2^2)/(2 p2) W/L,    at the pressure p2,
 
-for an ideal gas at constant temperature T. Its mean free path is (R the gas constant, M the molar mass; J. C.
-Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
+for an ideal gas at constant temperature T. With the gas constant R and the molar mass M, the mean free path of a gas is
+(J. C. Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
 
     lambda = (eta/p) sqrt(pi R T/(2 M)).
 
-At walls that reflect all molecules diffusely a gas slips: `g^3 (1 + 6 lambda/g)` replaces g^3 for a gap g, here with
-lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above ten mean
-free paths; in smaller gaps the true flow is larger.
+A gas slips at walls that reflect all molecules diffusely. Then `g^3 (1 + 6 lambda/g)` replaces g^3 in the Reynolds
+equation. Here lambda is taken at the mean pressure (p1 + p2)/2, which is exact for a gap of constant height. The error
+is about 10 % for gaps above ten mean free paths; in smaller gaps the true flow is larger.
 
-Both flows are viscous. A gas has inertia, too, which limits its mass flow through an open section A by the isentropic
-law of A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85. With the ratio kappa of heat
-capacities the limit is
+These flows are viscous. The inertia of a gas also limits its mass flow through an open section A, by the isentropic law
+of A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85. With the ratio kappa of heat capacities
+the limit is
 
     A p1 sqrt(M/(R T)) sqrt(2 kappa/(kappa - 1) (r^(2/kappa) - r^((kappa + 1)/kappa))),
 
-r being the larger of p2/p1 and (2/(kappa + 1))^(kappa/(kappa - 1)), at which the flow is choked.
+where r is the larger of p2/p1 and (2/(kappa + 1))^(kappa/(kappa - 1)). If p2/p1 is smaller than the second value, the
+flow is choked: a lower p2 does not increase it.
 """
 
 import math
@@ -65,12 +66,12 @@ PANEL = 1  # tuning: columns per panel of SuperLU
 
 
 class Balance:
-    """Balance of the flows into and out of each cell of a map.
+    """Balance of the flows into and out of each cell of a map, for a flow along y from the first to the last row.
 
-    `resistances` are 1/g^3, infinite in dry cells; `aspect` is the side of a cell across the flow divided by its side
-    along the flow. The flow is along y, from the first to the last row; the other sides are `periodic` or closed. The
-    pressure is prescribed half a cell outside these rows: `first` and `last` are the conductances to these ends, shape
-    (nx,).
+    `resistances` are 1/g^3, shape (ny, nx), infinite in dry cells. `aspect` is the side of a cell across the flow
+    divided by its side along the flow. The sides along the flow are `periodic` or closed. The pressure is prescribed on
+    the two ends of the map, which are half a cell before the first row and half a cell behind the last row. `first` and
+    `last` are the conductances between these rows and their ends, shape (nx,).
     """
 
     def __init__(self, resistances: Map, aspect: float, periodic: bool) -> None:
@@ -99,7 +100,8 @@ class Balance:
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=PANEL, options=options)
 
     def solve(self, given: Map) -> Map:
-        """Return the map of pressures for the sources `given` in each cell; 0 in dry cells."""
+        """Return the map of pressures for the sources `given` in each cell; both have the shape (ny, nx). Pressures are
+        0 in dry cells."""
         black, pressure = self._number >= 0, np.zeros_like(self._sum)
         if self._factors is not None:
             total = given.copy()
@@ -246,11 +248,11 @@ def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
 
 
 def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
-    """Return the smallest gap on the widest path from end to end, and its row and column. The widest path has the
-    largest smallest gap.
+    """Return the critical constriction [m] of a map of gaps [m], and its row and column.
 
-    Returns 0 and None if contact closes all paths. Cells are opened in the order of falling gaps until both ends are
-    connected: the last cell opened is the constriction.
+    Each path from end to end has a narrowest place. The widest path is the one whose narrowest place has the largest
+    gap, and this place is the critical constriction. The function opens cells in the order of falling gaps until both
+    ends are connected: the last cell opened is the constriction. It returns 0 and None if contact closes all paths.
     """
     open_, (ny, nx) = np.flatnonzero(gap > 0.0), gap.shape
     cell = int(_open_until_connected(open_[np.argsort(-gap.ravel()[open_])], ny, nx, periodic_sides))
@@ -303,11 +305,12 @@ MOST_OF_CONSTRICTION = 1e3  # accuracy: largest gap over the critical constricti
 
 @dataclass(frozen=True)
 class Flow:
-    """Flow along one direction; `conductivity` is K [m^3], 0 if no path leads from end to end.
+    """Flow along one direction.
 
-    `constriction` [m] is the smallest gap on the widest path and `position` its row and column; `imbalance` is the
-    relative difference between the outflow and the flow by dissipation, a rounding error; `pressure` is the map of the
-    fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
+    `conductivity` is K [m^3], 0 if no path leads from end to end. `constriction` [m] is the critical constriction, the
+    smallest gap on the widest path, and `position` its row and column. `imbalance` is the relative difference between
+    the outflow and the flow that follows from the dissipation, a rounding error. `pressure` is the map of the fluid's
+    pressure, which falls from 1 at the first end to 0 at the last end and is NaN where no fluid flows.
     """
 
     conductivity: float
@@ -350,8 +353,9 @@ def _resistances(gap: FloatMap, constriction: float, periodic_sides: bool) -> Fl
 
 
 def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x") -> float:
-    """Return the smallest open section [m^2] across a flow along `axis`, counting cells in which fluid flows; 0 if
-    contact closes the gap. `gap` [m] has the shape (ny, nx), and `size` is (lx, ly) [m]."""
+    """Return the smallest open section [m^2] across a flow along `axis`: of all sections normal to the axis, the
+    smallest area between the surfaces in cells through which fluid flows. Return 0 if contact closes the gap. `gap` [m]
+    has the shape (ny, nx), and `size` is (lx, ly) [m]."""
     across, width = (0, size[1]) if axis == "x" else (1, size[0])
     wet = np.where(np.isfinite(flow.pressure), gap, 0.0)
     return float(wet.mean(axis=across).min()) * width
@@ -360,8 +364,9 @@ def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: st
 def flow_mesh_error(
     gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
-    """Return the relative change of K if only every second point of the gap is used, starting with the first or the
-    second, whichever changes K more; NaN if contact closes the gap. The other arguments are as in `solve_flow`."""
+    """Return the relative change of K if only every second point of the gap is used. The points start with the first or
+    with the second one, whichever changes K more. Return NaN if contact closes the gap. `gap`, `size`, `axis` and
+    `periodic_sides` are as in `solve_flow`."""
     if not flow.percolates:
         return math.nan
     found = []
@@ -375,9 +380,9 @@ def flow_mesh_error(
 class Leak:
     """Flow through a gap along x and along y.
 
-    `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives `K/(12
-    eta) dp/length` through each metre of width. `constriction` [m] is the smallest gap on the widest path in the
-    direction that leaks more; 0 if contact closes the gap.
+    `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives the flow
+    `K/(12 eta) dp/length` through each metre of width. `constriction` [m] is the larger of the critical constrictions
+    along x and along y; 0 if contact closes the gap.
     """
 
     along_x: Flow
@@ -441,8 +446,8 @@ ROOM = 293.15  # physics: temperature of the table [K]
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: `viscosity` [Pa s], the `density` of a liquid [kg/m^3], NaN if unknown, or the `molar_mass`
-    [kg/mol] and the ratio of heat capacities of a gas."""
+    """A fluid at 20 C with its `viscosity` [Pa s]. A liquid has a `density` [kg/m^3], NaN if it is unknown. A gas has a
+    `molar_mass` [kg/mol] and the ratio `heat_ratio` of its heat capacities [-]; `molar_mass` is None for a liquid."""
 
     name: str
     viscosity: float
@@ -458,12 +463,12 @@ class Fluid:
 
     @property
     def choking_ratio(self) -> float:
-        """Ratio of low to high pressure below which the flow of a gas is choked."""
+        """Ratio of the low to the high pressure [-] below which the flow of a gas is choked."""
         kappa = self.heat_ratio
         return float((2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
 
     def density_at(self, pressure: float) -> float:
-        """Return the density [kg/m^3] at a pressure [Pa]; NaN if unknown."""
+        """Return the density [kg/m^3] at an absolute pressure [Pa]; NaN if it is unknown."""
         return self.density if self.molar_mass is None else pressure * self.molar_mass / (GAS_CONSTANT * ROOM)
 
 
@@ -477,10 +482,10 @@ FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edi
 
 @dataclass(frozen=True)
 class PressureDrop:
-    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas.
+    """A fluid whose pressure falls from `high` to `low` [Pa] along the flow; for a gas both are absolute pressures.
 
-    If `total` is True, the fluid carries its part of the load, and loads are measured above `ambient` [Pa] (default:
-    `low`).
+    If `total` is True, the fluid carries a part of the load, and loads are measured above the pressure `ambient` [Pa],
+    by default `low`.
     """
 
     fluid: Fluid
@@ -491,48 +496,54 @@ class PressureDrop:
 
     @property
     def mean_free_path(self) -> float:
-        """Mean free path [m] at the mean of both pressures."""
+        """Mean free path [m] of a gas at the mean of the high and the low pressure; 0 for a liquid."""
         return self.fluid.mean_free_path(0.5 * (self.high + self.low))
 
     @property
     def outside(self) -> float:
-        """Ambient pressure [Pa], above which the load is measured."""
+        """Pressure [Pa] above which the load is measured."""
         return self.low if self.ambient is None else self.ambient
 
     @property
     def pressures(self) -> tuple[float, ...]:
-        """Pressures [Pa] of the fluid at which the conductivity is calculated: the mean, and both ends if a gas carries
-        a part of the load."""
+        """Pressures [Pa] of the fluid at which the conductivity is calculated: the mean of high and low pressure and,
+        if a gas carries a part of the load, also the low and the high pressure."""
         ends = (self.low, self.high) if self.total and self.mean_free_path else ()
         return (0.5 * (self.low + self.high), *ends)
 
     def local_loads(self, load: float) -> tuple[float, float]:
-        """Return the loads [Pa] that contact carries at the high and at the low side if the fluid carries its part."""
+        """Return the loads [Pa] that contact carries at the high-pressure end and at the low-pressure end of a seal
+        under a `load` [Pa], if the fluid carries the rest."""
         return load + self.outside - self.high, load + self.outside - self.low
 
     def conducting_gap(self, gap: NDArray[np.float64], pressure: float) -> NDArray[np.float64]:
-        """Return the gaps [m] through which, without slip at the mean pressure, as much mass flows as through `gap`
-        with slip at a `pressure` [Pa]."""
+        """Return the equivalent gaps [m] of a gas at a `pressure` [Pa], in the shape of `gap`; for a liquid, return
+        `gap`.
+
+        A gas at this pressure slips in a gap. If it had the mean pressure of the drop and did not slip, the same
+        pressure gradient would drive the same mass flow through the equivalent gap.
+        """
         if not (path := self.mean_free_path):
             return gap
         return np.cbrt(gap**2 * (pressure / self.pressures[0] * gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
-        """Return the volume flow [m^3/s] at the low side for a conductivity [m^3], a length along and a width across
-        the flow [m]; NaN for a gas that flows into a vacuum."""
+        """Return the volume flow [m^3/s] at the low pressure, through a conductivity [m^3] over a `length` along and a
+        `width` across the flow [m]; NaN for a gas that flows into a vacuum."""
         drive = self.high - self.low
         if self.fluid.molar_mass is not None:
             drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
     def mass_flow(self, conductivity: float, length: float, width: float) -> float:
-        """Return the mass flow [kg/s] for a conductivity [m^3] over a length and a width [m]; NaN for an unknown
-        density."""
+        """Return the mass flow [kg/s] through a conductivity [m^3] over a `length` along and a `width` across the flow
+        [m]; NaN if the density is unknown."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
 
     def inertial_bound(self, section: float) -> float:
-        """Return the largest mass flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
+        """Return the largest mass flow [kg/s] that inertia lets pass through an open section [m^2]; infinite for a
+        liquid."""
         if self.fluid.molar_mass is None:
             return math.inf
         kappa, ratio = self.fluid.heat_ratio, max(self.low / self.high, self.fluid.choking_ratio)
@@ -540,8 +551,9 @@ class PressureDrop:
         return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
 
     def describe_inertia(self, axis: str, viscous: float, bound: float) -> str:
-        """Return a warning if the viscous flow of a gas [kg/s] along an axis is near its bound by inertia [kg/s], or
-        ''."""
+        """Return a warning if inertia limits the flow of a gas along an axis, else ''. Inertia matters if the `viscous`
+        mass flow is more than the fraction INERTIA of the largest mass flow that inertia lets pass, `bound`; both are
+        in kg/s."""
         if not viscous > INERTIA * bound:
             return ""
         both = 1.0 / (1.0 / viscous + 1.0 / bound)
@@ -553,8 +565,9 @@ class PressureDrop:
         )
 
     def describe_rate(self, conductivity: float, length: float, width: float) -> str:
-        """Return a text on the flow for a conductivity [m^3], a length along and a width across the flow [m]: in ml/h
-        at the low side, for a gas also at 1 bar, and in mg/s if the density is known."""
+        """Return a text with the flow through a conductivity [m^3] over a `length` along and a `width` across the flow
+        [m]. It gives the volume flow at the low pressure, the mass flow if the density is known, and for a gas the
+        volume flow at 1 bar."""
         rate, mass = (flow(conductivity, length, width) for flow in (self.flow_rate, self.mass_flow))
         said = [] if math.isnan(rate) else [f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h) at the low side"]
         said += [] if math.isnan(mass) else [f"{1e6 * mass:.3g} mg/s"]

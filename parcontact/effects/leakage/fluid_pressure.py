@@ -1,18 +1,23 @@
-"""Pressure of a fluid that flows along x through a map of gaps, and the rounds in which it settles with the contact.
+"""Pressure of a fluid that flows along x through a map of gaps, found together with the contact in rounds.
 
-In contact and in closed pools the flow does not determine the pressure. There a small leak eps, SMALL of the mean of
-g^3, determines it:
+In contact and in closed pools the flow does not determine the pressure. A small leak eps determines it there, which is
+SMALL times the mean of g^3:
 
-    div((g^3 + eps) grad p) = 0;    of a gas div((g^3 + 6 lambda g^2 + eps) grad p^2) = 0.
+    div((g^3 + eps) grad p) = 0                            for a liquid,
+    div((g^3 + 6 lambda g^2 + eps) grad p^2) = 0           for a gas.
 
-The unknown of the rounds is the share s of the pressure drop, 1 at the high and 0 at the low end,
+The pressure falls from p1 at the high end to p2 at the low end. The unknown of the rounds is the share s, which falls
+from 1 to 0:
 
-    p = p2 + s (p1 - p2)    of a liquid,    p^2 = p2^2 + s (p1^2 - p2^2)    of a gas.
+    p = p2 + s (p1 - p2)            for a liquid,
+    p^2 = p2^2 + s (p1^2 - p2^2)    for a gas.
 
-A round solves the contact under the fluid's pressure, and gets another share from the gap. Anderson's method (D. G.
-Anderson, J. ACM 12 (1965) 547) gives the next share from the last DEPTH rounds. Near percolation, pools open and close
-again: after ANDERSON rounds each cell makes a part of its change, which is halved whenever the change turns back. If
-EACH rounds have not settled, rounds go on with eps GROWTH times as large.
+Each round solves the contact under the pressure of the fluid, and then the flow through its gap, which gives another
+map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map for the next round from the last `DEPTH
++ 1` rounds. Near percolation, pools open and close again. Therefore each cell changes its s by a part of the difference
+only, after `ANDERSON` rounds, and this part is halved whenever the difference changes its sign. If the rounds have not
+settled after `EACH` of them, they go on with an eps that is `GROWTH` times as large, and begin again with Anderson's
+method.
 """
 
 import math
@@ -35,20 +40,21 @@ SETTLED = 1e-4  # accuracy: estimated relative error of the flow by the rounds, 
 
 
 def pressure_of(drop: PressureDrop, share: Map) -> Map:
-    """Return the fluid's pressure above ambient [Pa], a map, for a map of the share s."""
+    """Return the map of the fluid's pressure above ambient [Pa], from a map of the share s of the pressure drop."""
     if drop.fluid.molar_mass is None:
         return drop.low + share * (drop.high - drop.low) - drop.outside
     return np.sqrt(drop.low**2 + share * (drop.high**2 - drop.low**2)) - drop.outside
 
 
 def linear_share(shape: tuple[int, int]) -> Map:
-    """Return the share s in an even gap, a map of `shape` (ny, nx)."""
+    """Return the share s of the pressure drop in a gap of constant height, a map of `shape` (ny, nx)."""
     row = 1.0 - (np.arange(shape[1]) + 0.5) / shape[1]
     return np.broadcast_to(row, shape).copy()
 
 
 def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
-    """Return the gaps through which as much flows without slip as through `gap` [m] with slip at the local pressure."""
+    """Return the map of gaps [m] through which as much fluid would flow without slip as flows through `gap` [m] with
+    slip. `share` is the map of s, which gives the local pressure."""
     if not drop.mean_free_path:
         return gap
     local = np.maximum(pressure_of(drop, share) + drop.outside, 0.0)
@@ -58,14 +64,16 @@ def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
 
 @dataclass(frozen=True)
 class Filled:
-    """The share s in all cells, and the conductivity including the small leak [m^3]."""
+    """The map of the share s of the pressure drop in all cells, shape (ny, nx), and the conductivity of the gap [m^3]
+    including the small leak."""
 
     share: Map
     conductivity: float
 
 
 def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
-    """Return the share s in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
+    """Return the share s of the pressure drop in all cells and the conductivity, for a map of conducting gaps [m],
+    shape (ny, nx), on a box of `size` (lx, ly) [m]. `small` is the small leak, divided by the mean of g^3."""
     cubes = gap.T**3
     mean = float(cubes.mean())
     resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)
@@ -76,8 +84,8 @@ def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Fil
 
 
 class Rounds:
-    """The rounds of one step, with the shares of earlier rounds, for a pressure drop on a box of `size` [m]; on
-    root."""
+    """The rounds of one step for a pressure drop on a box of `size` (lx, ly) [m]. The object keeps the maps of earlier
+    rounds, and lives on root only."""
 
     def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
         self._drop, self._size, self.count = drop, size, 0
@@ -87,10 +95,12 @@ class Rounds:
         self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
-        """Make a round with the gap [m] of the contact under the fluid's pressure of a `share`.
+        """Make a round: find the flow through the map `gap` [m], which belongs to the contact under the fluid's
+        pressure for the map `share` of s.
 
-        Return whether the rounds have settled, whether the fluid lifts the seal off, and the relative change of the
-        flow; and the share of the next round. The mean pressure is at most `most` [Pa].
+        Return two items. The first one tells whether the rounds have settled, whether the fluid lifts the seal off, and
+        the estimated relative error of the flow. The second one is the map of s for the next round, whose mean pressure
+        is at most `most` [Pa].
         """
         if self.count and self.count % EACH == 0:
             self._restart()
@@ -161,9 +171,13 @@ class Rounds:
 def seal_flow(
     gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
 ) -> dict[str, float]:
-    """Return the values of a seal's columns by name, and the bound of the mass flow by inertia [kg/s], for the gap [m]
-    after all rounds. `rounds` is None if the fluid has no pressure. A gap with a smaller flow than the leak is
-    closed."""
+    """Return the values of a seal's columns by name, and as `bound` the largest mass flow [kg/s] that inertia lets
+    pass, after the last round.
+
+    `gap` [m] and `share` are the maps of the gap and of s, and `size` is (lx, ly) [m]. `rounds` is None if the pressure
+    of the fluid is the ambient one everywhere. The gap counts as closed if less flows through it than through the small
+    leak.
+    """
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)
     flow = solve_flow(through, size, "x", True)

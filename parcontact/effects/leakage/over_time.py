@@ -1,16 +1,17 @@
 """`parcontact leak`: the flow through the saved gaps of a run, as leak.csv and a picture.
 
-If the fluid carries a part of the load p0, contact carries p0 - (p - p_a), with the pressure p of the fluid and the
-ambient pressure p_a. In a long seal the conductivity K at a place belongs to this local load, and is known from loads
-that a run has saved. The flow per width is
+The load p0 is measured above the ambient pressure p_a. If the fluid, at the local pressure p, carries a part of the
+load, contact carries the rest, the local load p0 - (p - p_a). In a long seal the conductivity K at a place depends on
+the local load at this place. K is known for the loads that a run has saved. With the length L of the seal, the flow per
+width is
 
     liquid     1/(12 eta L) int K(p0 + p_a - p) dp,
     gas        M/(12 eta R T L) int K(p0 + p_a - p) p dp    [kg/(m s)],
 
-from the low to the high pressure, where K of a gas has the slip at p (`flow`). Below, K of a gas is multiplied by p and
-divided by the mean pressure. The logarithm of K is interpolated between loads without new extrema (F. N. Fritsch and R.
-E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238). Between pressures K is interpolated by a parabola, as it is almost
-linear in p.
+integrated from the low to the high pressure; the other symbols are those of `flow`. K of a gas includes the slip at the
+pressure p. In this module K of a gas is multiplied by p and divided by the mean pressure, so that both integrals are
+the same. Between loads the logarithm of K is interpolated without new extrema (F. N. Fritsch and R. E. Carlson, SIAM J.
+Numer. Anal. 17 (1980) 238). Between pressures K is interpolated by a parabola, as it is almost linear in p.
 """
 
 import math
@@ -54,25 +55,25 @@ NOTABLE = 1.1  # ratio of both flows above which a sentence tells them apart
 class LoadCurve:
     """Conductivities of a gap as a function of the load.
 
-    `loads` [Pa] rise, shape (n,), and `flows` [m^3], shape (n, m), are the conductivities at the m pressures of a fluid
-    (`PressureDrop.pressures`), 0 where contact closes the gap.
+    `loads` [Pa] rise, shape (n,). `flows` [m^3], shape (n, m), are the conductivities at these loads and at the m
+    pressures `PressureDrop.pressures` of a fluid; they are 0 where contact closes the gap.
     """
 
     loads: Array
     flows: Array
 
     def covers(self, least: float, most: float) -> bool:
-        """Return True if the range of saved loads includes this range [Pa]."""
+        """Return True if the saved loads cover the range from `least` to `most` [Pa]."""
         slack = SAME * most
         return bool(least > 0.0 and self.loads[0] <= least + slack and most <= self.loads[-1] + slack)
 
     def inside(self, least: float, most: float) -> int:
-        """Return the number of saved loads in a range [Pa]."""
+        """Return the number of saved loads between `least` and `most` [Pa]."""
         return int(np.count_nonzero((self.loads >= least - SAME * most) & (self.loads <= most + SAME * most)))
 
     def conductivity(self, drop: PressureDrop, load: float) -> float:
-        """Return the conductivity [m^3] that gives the flow of a fluid which carries its part of a `load` [Pa]; NaN if
-        K is not known at all local loads."""
+        """Return the mean conductivity [m^3] of a seal under a `load` [Pa] of which the fluid carries a part; the flow
+        follows from it by `PressureDrop.flow_rate`. Return NaN if the saved loads do not cover all local loads."""
         least, most = drop.local_loads(load)
         if not self.covers(least, most):
             return np.nan
@@ -93,8 +94,8 @@ class LoadCurve:
 
 
 def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
-    """Return the curve through conductivities [m^3], shape (n, m), at saved loads [Pa]; only loads above 0 are used.
-    Raises InputError if K is no function of the load."""
+    """Return the curve through conductivities [m^3], shape (n, m), at the saved loads [Pa], shape (n,). Only loads
+    above 0 are used. Raises InputError if no load is above 0, or if K does not fall as the load rises."""
     given = np.asarray(loads, dtype=float)
     kept = np.flatnonzero(given > 0.0)
     order = kept[np.argsort(given[kept], kind="stable")]
@@ -115,7 +116,7 @@ def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
 
 
 def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float]) -> None:
-    """Raise InputError if the saved loads do not cover the local loads of any row."""
+    """Raise InputError if the saved loads cover the local loads of none of the `loads` [Pa]."""
     if not any(curve.covers(*drop.local_loads(load)) for load in loads):
         highest = float(curve.loads[-1])
         least, most = drop.local_loads(highest)
@@ -131,8 +132,9 @@ def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float
 
 
 def describe_cover(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float], shown: float) -> Iterator[str]:
-    """Yield sentences on rows, under `loads` [Pa], whose local loads are not all saved, and on too few saved loads for
-    the row under the load `shown`."""
+    """Yield a sentence on those of the `loads` [Pa] for which some local loads are outside the saved loads, so that
+    their rows of leak.csv lack the flow. Yield another sentence if too few saved loads are among the local loads for
+    the load `shown` [Pa]."""
     ends = [drop.local_loads(load) for load in loads if load > 0.0]
     empty = [end for end in ends if not curve.covers(*end)]
     if empty:
@@ -158,8 +160,8 @@ def _advice(least: float, most: float) -> str:
 
 
 def describe_part(axis: str, net: float, total: float) -> str:
-    """Return a sentence on the effect of the fluid's pressure on the flow along an axis: `net` is the conductivity
-    [m^3] if contact carries all of the load, `total` if the fluid carries its part."""
+    """Return a sentence on how the pressure of the fluid changes the flow along an axis. `net` is the conductivity
+    [m^3] if contact carries all of the load, and `total` the conductivity if the fluid carries a part of it."""
     if not total:
         return f"along {axis} contact closes the gap, also if the fluid carries its part of the load"
     if not net:
@@ -183,14 +185,18 @@ MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2
 
 
 class LeakInstant(NamedTuple):
-    """One row of leak.csv.
+    """One row of leak.csv, the flow at one saved instant.
 
-    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
-    just touches, NaN if unknown. `constriction` [m] is the smallest gap on the widest path of the direction that leaks
-    more; `flow_rate` [m^3/s] and `mass_flow` [kg/s] are the flow of a fluid in this direction, NaN without a fluid;
-    names with `total` are the same if the fluid carries its part of the load. `error_x` and `error_y` are the relative
-    changes of K on half the mesh (`flow.flow_mesh_error`). `parts` are, along x and along y, the conductivities for the
-    fluid [m^3] without and with its part; empty if not needed.
+    `flow_x` and `flow_y` are the conductivities K [m^3] along x and y. `share_x` and `share_y` are their ratios to K of
+    the undeformed surface that just touches, NaN if unknown. `constriction` [m] is the larger of the critical
+    constrictions `constriction_x` and `constriction_y`. `error_x` and `error_y` are the relative changes of K if the
+    mesh is halved (`flow.flow_mesh_error`).
+
+    `flow_rate` [m^3/s] and `mass_flow` [kg/s] are the flow of a fluid in the direction with the larger constriction, if
+    contact carries all of the load. `flow_rate_total` and `mass_flow_total` are this flow if the fluid carries a part
+    of the load. They are NaN if not asked for. `parts` has a pair for x and a pair for y: the conductivities for the
+    fluid [m^3] if contact carries all of the load, and if the fluid carries a part of it; `parts` is empty if the
+    second ones are not asked for.
     """
 
     time: float
@@ -215,8 +221,9 @@ class LeakInstant(NamedTuple):
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without maps. Pairs along x and y: the mesh `errors`, the conductivities [m^3] for a
-    fluid with slip at `PressureDrop.pressures`, and the smallest open `sections` [m^2]."""
+    """The flow at an instant, without maps. The other items are pairs, for x and y: the relative mesh `errors` of K; in
+    `of_fluid` the conductivities [m^3] for a fluid with slip, at each of `PressureDrop.pressures`; and the smallest
+    open `sections` [m^2]."""
 
     leak: Leak
     errors: tuple[float, float]
@@ -225,7 +232,8 @@ class SolvedLeak(NamedTuple):
 
 
 class Gaps:
-    """The saved gaps of a run at all instants or at one, 0 in contact; `drop` is the pressure drop of a fluid."""
+    """The saved gaps of a run in `directory`, at all instants or, if `at` is given, at one. `drop` is the pressure drop
+    of a fluid. Raises InputError if no gap is saved."""
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
@@ -251,7 +259,8 @@ class Gaps:
             raise InputError(f"{directory}: no map is saved yet")
 
     def read(self, index: int) -> FloatMap:
-        """Return the map of the gap [m] at a saved instant; raises InputError if the saved maps are incomplete."""
+        """Return the map of the gap [m], shape (ny, nx), at a saved instant; the gap is 0 in contact. Raises InputError
+        if the saved maps are incomplete."""
         with self.results.open_maps() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
@@ -262,15 +271,15 @@ class Gaps:
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> FloatMap:
-        """Return the map of the gap [m] of the undeformed surface that just touches; raises InputError without its
-        heights."""
+        """Return the map of the gap [m] under the undeformed surface that just touches, shape (ny, nx). Raises
+        InputError if the heights of the surface cannot be made."""
         job = reading.load(self.directory / outputs.RUN.resolved)
         setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
     def solve(self, index: int) -> tuple[SolvedLeak, list[FloatMap]]:
-        """Return the flow at a saved instant, and its maps for both directions."""
+        """Return the flow at a saved instant, and maps of the local flow along x and along y for pictures."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[FloatMap]()
         of_fluid, sections = list[tuple[float, ...]](), list[float]()
         for axis in ("x", "y"):
@@ -288,15 +297,16 @@ class Gaps:
         return self.periodic["yx".index(axis)]
 
     def _conductivities(self, gap: FloatMap, flow: Flow, axis: str) -> tuple[float, ...]:
-        """Return the conductivities for the fluid along an axis [m^3] at its pressures, NaN without a fluid."""
+        """Return the conductivities [m^3] for the fluid along an axis, one for each of its pressures; NaN without a
+        fluid."""
         if self.drop is None or not self.drop.mean_free_path:
             return (np.nan if self.drop is None else flow.conductivity,)
         gaps = (self.drop.conducting_gap(gap, pressure) for pressure in self.drop.pressures)
         return tuple(solve_flow(slipping, self.size, axis, self._sides(axis)).conductivity for slipping in gaps)
 
     def refuse_memory(self, at: str) -> None:
-        """Raise InputError unless K is a function of the load alone: for a contact with memory, for a single instant
-        `at`, and if the fluid already carries its part of the load."""
+        """Raise InputError if K is not a function of the load alone. This is the case if the contact has a memory, if
+        the fluid of the run already carries a part of the load, and if `at` selects a single instant."""
         if (section := self.job.section("leakage")) is not None and section.total:
             raise InputError(
                 "--load total is for runs whose contact carries all of the load: the fluid of "
@@ -324,7 +334,9 @@ class Gaps:
         return self._measured(index, "pressure")
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None, curves: Sequence[LoadCurve] = ()) -> LeakInstant:
-        """Return the row of leak.csv for an instant; `curves`, along x and y, are for a fluid that carries load."""
+        """Return the row of leak.csv for an instant. `bare` is the flow under the undeformed surface, None if it is
+        unknown. `curves` are the conductivities over the load along x and along y; they are given if the fluid carries
+        a part of the load."""
         found, row = solved.leak, {name: self._measured(index, name) for name in LeakInstant._fields[1:3]}
         totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
         along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))
@@ -360,12 +372,13 @@ class Gaps:
 def write_leakage(
     directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None
 ) -> Iterator[str]:
-    """Solve for the flow at the saved instants and write leak.csv and leak.png, or leak.STEP.csv and leak.STEP.png for
-    one instant; collective. Ranks share the instants.
+    """Solve for the flow at the saved instants and write leak.csv and leak.png, or leak.STEP.csv and leak.STEP.png if
+    `at` selects one instant; collective. Ranks share the instants.
 
-    `over` is the axis on which K is drawn: pressure, time, or "" for an automatic choice; `drop` adds the flow of a
-    fluid. Yields sentences on root. Raises InputError for a directory without gaps, and, if the fluid carries a part of
-    the load, for rows that are too few or no function of the load.
+    `over` is the axis on which K is drawn: pressure, time, or "" for an automatic choice. `drop` adds the flow of a
+    fluid. Root yields sentences on the results. Raises InputError if the directory has no saved gaps. If the fluid
+    carries a part of the load, raises InputError also if K is no function of the load, or if the saved loads cover the
+    local loads of no row.
     """
     gaps = Gaps(directory, at, drop)
     total = drop is not None and drop.total
@@ -398,15 +411,15 @@ def write_leakage(
 
 
 def _tells(row: LeakInstant, number: int) -> tuple[int, ...]:
-    """Return a key, largest for the row whose flow is described: of known flows the last one through an open gap, else
-    the last one through a gap that the fluid opens."""
+    """Return a key that is largest for the row whose flow is described. Rows with known flows come before others, then
+    rows with an open gap, then rows whose gap the fluid opens, and then later rows."""
     totals = [total for _, total in row.parts]
     return not any(map(math.isnan, totals)), bool(row.percolates_x + row.percolates_y), any(totals), number
 
 
 def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[FloatMap]]:
-    """Return, on root, the flow at all instants, the instant to draw and its maps: the last one with a flow in both
-    directions, or in one; collective."""
+    """Return, on root, the flow at all instants, the instant to draw, and the maps of this instant; collective. Drawn
+    is the last instant with a flow in both directions, else the last one with a flow in one direction."""
     mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[FloatMap](), ""
     working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
     try:
@@ -426,7 +439,8 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], 
 
 
 def _load_curves(gaps: Gaps, leaks: Mapping[int, SolvedLeak]) -> tuple[LoadCurve, LoadCurve]:
-    """Return K over the load along x and along y; raises InputError if they give the flow of no row."""
+    """Return K as a function of the load, along x and along y. Raises InputError if the saved loads cover the local
+    loads of no row."""
     drop, loads = gaps.drop, [gaps.load(index) for index in gaps.shown]
     assert drop is not None
     along_x = load_curve(loads, [leaks[index].of_fluid[0] for index in gaps.shown])

@@ -23,7 +23,7 @@ THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker":
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return True, or an array, where a constriction [m] is open but too narrow for continuum flow."""
+    """Return True where a constriction [m] is open but too narrow for continuum flow; an array for an array."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 
@@ -35,11 +35,12 @@ def conductivity_panel(
     log_x: bool = False,
     dotted: Mapping[str, Array] = MappingProxyType({}),
 ) -> Panel:
-    """Return a panel of conductivities K [m^3] on the axis `over`, all of shape (n,), with marks for their critical
-    constrictions [m].
+    """Return a panel of conductivities K [m^3] on the axis `over`. `at`, each array of `flows` and of `dotted`, and
+    each array of `constrictions` [m] have the shape (n,). Marks show where the critical constriction of the same name
+    is too narrow for continuum flow.
 
-    K is 0 where contact closes the gap, and NaN where it is not known. Conductivities named in `dotted` are drawn as
-    dotted lines in the same colours.
+    K is 0 where contact closes the gap, and NaN where it is not known. Conductivities in `dotted` are drawn as dotted
+    lines, in the colours of those in `flows`.
     """
     lines, thin = list[Line](), list[Line]()
     for number, (name, flow) in enumerate(flows.items()):
@@ -82,8 +83,9 @@ def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
 
 
 def _leak_over_pressure(run: PlottedRun) -> Iterator[Panel]:
-    """Yield the panel of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
-    that of a contact which carries all of this load, where the run has a row of it."""
+    """Yield the panel of the leak under the last load, against the high pressure of the fluid, if this pressure
+    changes. A dotted line shows the leak if contact carries all of this load; it is left out if the run has no row with
+    this contact."""
     section, columns = run.job.section("leakage"), run.columns
     load = columns["pressure"][-1]
     loaded = (np.abs(columns["pressure"] - load) <= SAME * abs(load)) & (columns["rounds"] > 0)
@@ -124,9 +126,10 @@ def draw_leakage(
 
 
 def panel_of(rows: Sequence[Any], over: str) -> Panel:
-    """Return the panel of K against `over`, pressure or time (default: time if a pressure occurs more than once).
+    """Return the panel of K against `over`, which is pressure or time; by default time if a pressure occurs more than
+    once.
 
-    Against pressure, only the last of consecutive instants at one pressure is drawn.
+    If the pressure stays constant over several instants, the panel against pressure shows only the last one of them.
     """
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
     pressure, time = columns["pressure"], columns["time"]

@@ -98,8 +98,8 @@ def _describe_leak(columns: Columns, row: int) -> str:
 
 
 def exported(run: Results) -> list[ExportedTable]:
-    """Return tables of the known conductivities by load for other programs, the last row for equal loads; none if the
-    fluid carries a part of the load."""
+    """Return tables for other programs: the known conductivities by load. If a load occurs in several rows, the last
+    one counts. There are none if the fluid carries a part of the load."""
     columns = run.read(TABLE) or run.table
     names = [name for name in EXPORTED if name in columns]
     flows = () if "high_pressure" in columns else columns.get("flow_x", ())

@@ -1,12 +1,14 @@
 """Contact law of a seal whose fluid carries a part of the load.
 
-With the contact pressure q >= 0 and the pressure p~ of the fluid above ambient, continued into contact
-(`fluid_pressure`),
+The contact pressure q and the pressure p~ of the fluid above ambient press the body together. p~ is continued into
+contact (`fluid_pressure`). The displacement of the body is A (q + p~), where A is the linear operator from pressure to
+displacement. With the heights h of the rigid surface and its approach d, the gap g satisfies
 
-    g = A (q + p~) - h - d >= 0,    q g = 0,    <q> = p0 - <p~>.
+    g = A (q + p~) - h - d >= 0,    q >= 0,    q g = 0,    <q> = p0 - <p~>,
 
-A round solves the contact of the heights `h - A p~` under the load `p0 - <p~>` by the usual contact law, and then the
-flow through its gap. Rounds end when flow and pressure no longer change. The body remembers q + p~.
+where p0 is the load above ambient, and <> the mean over the box. Each round first solves the contact of the heights `h
+- A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through its gap, which gives the next p~.
+Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
 """
 
 from __future__ import annotations
@@ -48,9 +50,13 @@ OPEN = 1e-30  # rounding: least open gap [m], as contact has the gap 0
 
 @dataclass(frozen=True)
 class SealMemory:
-    """Memory of a seal. `share` is the fluid's share of the pressure drop, `gap` the gap [m], 0 in contact, and `spare`
-    holds two maps for the next step. `pressures` of the fluid [Pa] and the `modulus` belong to the last step, and are 0
-    before the first one. `flows` is True if the share is known. `end` has time and load of the lift-off."""
+    """Memory of a seal after a step.
+
+    `share` is the map of the share s of the pressure drop (`fluid_pressure`), and `gap` the map of the gap [m], 0 in
+    contact. `spare` holds two maps for the next step. `pressures` are the high and the low pressure of the fluid [Pa],
+    and `modulus` is the modulus of the body in the step; these are 0 before the first step. `flows` is True if the
+    share is known. `end` has the time and the load at which the seal lifted off, None if it has not.
+    """
 
     share: Array
     gap: Array
@@ -80,7 +86,7 @@ class SealLaw:
         self._dry: ContactLaw[Any] | None = None
 
     def upon(self, dry: ContactLaw[Any]) -> SealLaw:
-        """Take the usual law `dry` for the solves of contacts, and return this law."""
+        """Take the usual law `dry`, which solves the contacts, and return this law."""
         self._dry = dry
         return self
 
@@ -94,8 +100,9 @@ class SealLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[SealMemory]:
-        """Solve the contact and the flow of a step; see `effects.effect.ContactLaw.solve`. If the fluid has a pressure,
-        solves use the job's tolerance, at most SHARP."""
+        """Solve for the contact and the flow of a step; see `effects.effect.ContactLaw.solve`. If the pressure of the
+        fluid differs from ambient, contacts are solved to the job's tolerance or to SHARP, whichever is smaller, and
+        `tolerance` is not used."""
         assert self._dry is not None
         drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare
         flows = memory.flows or drop.high > drop.low
@@ -215,7 +222,7 @@ class SealLaw:
         return memory.gap / self.scene.units.height if memory.modulus else None
 
     def detached(self, memory: SealMemory) -> Detached | None:
-        """Return time and load of the lift-off; None before it."""
+        """Return the time and the load at which the seal lifted off; None if it has not."""
         return memory.end
 
     def with_end(self, memory: SealMemory, end: Detached) -> SealMemory:

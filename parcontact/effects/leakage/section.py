@@ -89,7 +89,7 @@ def _whole(load: str, every: int, pressures: Pair | None) -> Iterator[Fault]:
 class Leakage(Part):
     """The `leakage` section: the fluid, and the number of steps between two calculations of the flow.
 
-    With `load: total` the fluid carries its part of the load.
+    With `load: total` the fluid carries a part of the load.
     """
 
     label: ClassVar[str] = "leakage"
@@ -113,7 +113,7 @@ class Leakage(Part):
 
     @property
     def total(self) -> bool:
-        """True if the fluid carries its part of the load."""
+        """True if the fluid carries a part of the load."""
         return self.load == "total"
 
     @property
