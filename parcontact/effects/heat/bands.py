@@ -1,18 +1,23 @@
 """Temperatures of bands: the rise in each band that its own heat and the heat of all other bands cause.
 
-The heat of a band is released where its waves strain the rubber, and is distributed over the contact in proportion to
-the pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
-shares g_i(m) and g_k(m) of `effects.heat.solver`, 1 on the surface, the rise of band k is
+The heat of a band is released at the depths where its waves strain the rubber, and is distributed over the contact in
+proportion to the pressure. The temperature is a sum of waves cos(m z) along the depth (`effects.heat.solver`). Such a
+wave has the share g_i(m) in the heat of band i, and the share g_k(m) in the mean temperature of the rubber that
+dissipates in band k. With the heat h_i [W/m^2] of band i, the rise of band k is
 
-    T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, k) S_j(m)) dm,
+    T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, j <= k) S_j(m)) dm.
 
-with the heat h_i [W/m^2] of band i, a uniform part `S = (1 - exp(-m^2 D t))/(kappa m^2)` after the sliding time t, and
-for the waves of the pressure of band j, of power P(q) relative to the square of its mean,
+Here S belongs to uniform heat after the sliding time t,
+
+    S(m) = (1 - exp(-m^2 D t))/(kappa m^2),
+
+and S_j to the waves in the pressure of band j, which have the power P(q) relative to the square of the mean pressure:
 
     S_j(m) = sum_q P(q) Re (1 - exp(-(beta^2 + m^2) D t))/(beta^2 + m^2)/kappa.
 
-Waves of band j modulate only the heat of bands as fine as j or finer. Heat of the interface is released on the surface
-and counts as the finest band.
+Bands are numbered from the coarsest. Waves of band j modulate both the heat of band i and the temperature of band k
+only if i and k are as fine as j or finer. Heat of the interface is released on the surface, where g = 1, and counts as
+heat of the finest band.
 """
 
 import math
@@ -44,8 +49,8 @@ SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits 
 
 
 def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
-    """Return wavenumbers m [1/m] along the depth for bands between two wavenumbers [1/m], and weights in the
-    integral."""
+    """Return wavenumbers m [1/m] along the depth for bands between the wavenumbers `low` and `high` [1/m], and the
+    weights of these m in `2/pi int ... dm`; both have the shape (m,)."""
     ends = np.log(LOWEST * low), np.log(HIGHEST * high)
     m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
     step = float(np.log(m[1] / m[0]))
@@ -55,7 +60,7 @@ def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
 
 
 def uniform(body: Conductor, m: Array, time: float) -> Array:
-    """Return the uniform part S(m) [K m^2/W 1/m] of the rise after a sliding time [s]."""
+    """Return the uniform part S(m) [K m^3/W] of the rise after a sliding time [s], shape (m,)."""
     return np.asarray(-np.expm1(-(m**2) * body.diffusivity * time) / m**2 / body.conductivity)
 
 
@@ -86,7 +91,7 @@ def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: 
 
 
 def shares_of_depth(setup: Setup, pressure: Array, velocity: Vector, m: Array) -> Array:
-    """Return the shares g(m) of waves along the depth in the heat of a band under this map of pressure."""
+    """Return the shares g(m) of waves along the depth in the heat of a band, under this map of pressure, shape (m,)."""
     depths = depths_of(
         setup.fft.forward(pressure), setup.fft, setup.half_space, setup.units.length, velocity, setup.prony
     )
@@ -103,8 +108,9 @@ def rises_of(
 ) -> list[float]:
     """Return the temperature rise [K] of each band, from the coarsest.
 
-    `weights` belong to the waves m; `uniform` is S(m); `shares` g(m), `warmings` S_j(m) and `heats` [W/m^2] have one
-    item per band; `rubbed` [W/m^2] is the heat of the interface.
+    `weights` are the weights of the waves m in the integral, and `uniform` is S(m), both of shape (m,). `shares`,
+    `warmings` and `heats` have one item per band: g(m) and S_j(m), of shape (m,), and the heat [W/m^2]. `rubbed`
+    [W/m^2] is the heat of the interface.
     """
     sums = uniform + np.cumsum(warmings, axis=0)  # S and all S_j down to a band
     sources = [*zip(shares, heats, strict=True), (np.ones_like(weights), rubbed)]
@@ -117,8 +123,9 @@ def rises_of(
 def flash_of_bands(
     rises: Sequence[float], heats: Sequence[float], rounds: int = 1, friction_cold: float = math.nan
 ) -> Flash:
-    """Return the temperatures of a contact in bands: the mean weighted by heat, the highest of a band, and
-    quartiles."""
+    """Return the temperatures of a contact from the `rises` [K] of its bands: the mean and the quartiles, weighted by
+    `heats`, and the highest rise of a band. The result also stores the number of `rounds` in which the rises were
+    found, and the friction of cold rubber, `friction_cold`."""
     order = np.argsort(rises)
     values, weights = np.asarray(rises)[order], np.asarray(heats)[order]
     whole = float(weights.sum())
@@ -137,7 +144,7 @@ def seconds_of(job: Job, cut: Cut, velocity: Vector) -> float:
 
 
 class HeatProbe:
-    """Measures S_j(m) and g(m) of the heat in the contacts of a band."""
+    """Measures S_j(m) and g(m) in the contacts of a band."""
 
     means: ClassVar[Means] = {"depths": by_load, "warming": by_square}
 
@@ -146,19 +153,19 @@ class HeatProbe:
         self._waves, _ = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))
 
     def slide(self, setup: Setup, velocity: Vector) -> None:
-        """Prepare S_j(m) for a velocity [m/s]."""
+        """Prepare the measurement of S_j(m) for a velocity [m/s]."""
         if velocity != self._velocity:
             body, seconds = self._job.section("thermal").conductor, seconds_of(self._job, self._cut, velocity)
             self._warming, self._velocity = warming_of(setup, body, seconds, velocity, self._waves), velocity
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
-        """Return g(m) and S_j(m) of a contact."""
+        """Return g(m) as `depths` and S_j(m) as `warming` of a contact, both of shape (m,)."""
         depths = shares_of_depth(setup, contact.p, velocity, self._waves)
         return {"depths": depths, "warming": self._warming.apply(setup, contact.p)}
 
 
 def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
-    """Yield the measure of heat if the job has heat."""
+    """Yield the probe that measures g(m) and S_j(m) of bands, if the job has a `thermal` section."""
     if job.section("thermal") is not None:
         yield HeatProbe(job, cut)
 
@@ -166,8 +173,9 @@ def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
 class HeatOfBands:
     """The loop that finds the temperatures of bands.
 
-    With feedback each band has its own temperature, a fixed point found by Aitken's relaxation. No temperature above
-    the range of the material's shift is tried. The first round is for cold bands.
+    With feedback each band relaxes at its own temperature. The temperatures change the friction of bands, whose heat
+    gives new temperatures: Aitken's relaxation finds the temperatures that do not change any more. The first round is
+    for cold rubber. No temperature above the range of the material's shift is tried.
     """
 
     words: ClassVar[tuple[str, str]] = ("temperatures", "feedback: none")
@@ -188,8 +196,9 @@ class HeatOfBands:
             raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
 
     def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the bands have the rises that their heat causes. There is no heat until all else has settled
-        for cold rubber."""
+        """Return True if the bands have the rises that their heat causes, within an error. As long as other loops have
+        not settled for cold rubber, heat is ignored and the rises stay 0. Arguments are as in
+        `bands.road_sliding.BandLoop.settles`."""
         rubbed = road.rub(results) * road.speed
         self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises
         if math.isnan(self._cold):
@@ -200,7 +209,8 @@ class HeatOfBands:
         return bool(np.all(self._settled))
 
     def move(self, road: RoadSliding, results: Results) -> None:
-        """Set the temperature rises of the next round; raises RunError if they exceed the shift's range."""
+        """Set the temperature rises of the next round. Raises RunError if the rises cannot settle below the end of the
+        shift's range."""
         over, last, most = self._over, self._last, self._highest - road.own_temperature
         at_most = (self._rises == most) & (over > 0.0)
         if not np.all(self._settled) and np.all(self._settled | at_most):
@@ -233,6 +243,6 @@ class HeatOfBands:
 
 
 def loops(job: Job, cut: Cut) -> Iterator[HeatOfBands]:
-    """Yield the loop over temperatures if the job has heat."""
+    """Yield the loop that finds the temperatures of bands, if the job has a `thermal` section."""
     if job.section("thermal") is not None:
         yield HeatOfBands(job, cut)

@@ -64,7 +64,7 @@ def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
 
 
 class Counterbody(Part):
-    """Section of the rigid body as a conductor of heat."""
+    """The section `thermal.counterbody`: the rigid body conducts a part of the heat of the interface."""
 
     label: ClassVar[str] = "counterbody"
     conductivity: Positive = Field(description="a positive conductivity of the rigid body [W/(m K)]")
@@ -99,8 +99,8 @@ class Thermal(Part):
 
 
 def exponentials_of(job: Any) -> Exponentials:
-    """Return the sum of exponentials that approximates conduction in a job, from its shortest sliding step to the
-    diffusion time of the longest wave."""
+    """Return the sum of exponentials that describes the conduction of heat in the rubber of a job. It holds for times
+    from the shortest sliding step to the diffusion time of the longest wave in the box."""
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
@@ -115,12 +115,13 @@ def exponentials_of(job: Any) -> Exponentials:
 
 @dataclass(frozen=True)
 class ThermalMemory:
-    """Memory of heat: waves, temperatures, and what the next step needs.
+    """Memory of heat after a step.
 
-    `heat` holds the waves; `rise` is the map of the surface [K]; `flash` and `highest` are the flash temperature and
-    the highest rise [K]; `force` [N] of the body and contact `area` belong to the end of the last step; `warmed` is
-    True after any heat; `share` of the last heat was released in the body, at `depths`; `error` is the relative error
-    of friction, infinite if unknown.
+    `heat` holds the waves of temperature, and `rise` is the map of the temperature rise of the surface [K]. `flash` is
+    the flash temperature and `highest` the highest rise of the surface [K]. `force` [N] is the force of the body and
+    `area` the contact area, both at the end of the step. `warmed` is True if heat has ever been released. The body
+    released the fraction `share` of the last heat, at the depths `depths`; the surface released the rest. `error` is
+    the relative error of friction, infinite if it is unknown.
     """
 
     heat: HeatMemory
@@ -154,7 +155,8 @@ def feeds_back(job: Any) -> bool:
 
 
 class ThermalColumns(Effect[ThermalMemory]):
-    """Columns of heat: mean temperature rise of the contact, weighted by heat, and highest rise of the surface [K].
+    """The effect of heat. Its columns are the flash temperature, which is the mean temperature rise of the contact,
+    weighted by heat, the highest rise of the surface [K], and the relative error of the flash temperature.
 
     At rest the weights of the last sliding are used.
     """
@@ -176,7 +178,8 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def curve_options(job: Any) -> Iterator[str]:
-        """Yield the requirements of columns of friction curves that the job meets."""
+        """Yield the options of a job for which friction curves have further columns (`Column.when`): thermal, and
+        feedback if it is on."""
         yield from ("thermal", *["feedback"] * feeds_back(job))
 
     @staticmethod
@@ -246,8 +249,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
     def time_factor(self, memory: ThermalMemory) -> float:
-        """Return the ratio of relaxation times at the flash temperature to the job's relaxation times; 1 without
-        feedback. Raises RunError."""
+        """Return the relaxation times at the flash temperature, divided by the job's relaxation times; 1 without
+        feedback. Raises RunError outside the range of the material's shift."""
         if not (self._feeds_back and memory.warmed):
             return 1.0
         try:
@@ -256,7 +259,8 @@ class ThermalColumns(Effect[ThermalMemory]):
             raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
 
     def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
-        """Return the heat of a step from the forces at both ends, and the memory with those of its end."""
+        """Return the heat of a step, from the forces before and after it, and the memory with the force and area after
+        it."""
         measures, velocity, sheared = instant.measures, instant.step.velocity, instant.sheared
         speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
         own = measures.force_interface
@@ -316,7 +320,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory that a checkpoint holds; collective. Missing waves, of shorter steps, start at 0."""
+        """Return the memory that a checkpoint holds; collective. If the job now has shorter steps than the checkpoint,
+        it has further waves of temperature, and these start at 0."""
         per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

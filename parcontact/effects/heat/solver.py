@@ -1,56 +1,57 @@
-"""Temperatures that the heat of sliding causes: steady, in time steps, and below a free box.
+"""Temperatures that the heat of sliding causes: in steady sliding, in time steps, and below a free box.
 
-Steady sliding: heat q [W/m^2] on the surface of a half space of conductivity kappa and diffusivity D, below a contact
-that slides at the velocity v, causes the steady temperature rise, in the frame of the contact,
+Steady sliding. Heat q^(k) [W/m^2] is released on the surface of a half space of conductivity kappa and diffusivity D,
+below a contact that slides at the velocity v; the rest of the surface is insulated. k is the wave vector of the heat.
+In the frame of the contact the steady temperature rise of the surface is (H. S. Carslaw, J. C. Jaeger, Conduction of
+Heat in Solids (1959), section 10.7)
 
-    T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0                                (1)
+    T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0.                               (1)
 
-(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is insulated.
-Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an incompressible half space
-has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under crests and troughs. So the
-heat of the wave has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and arrives with the
-factor
+Heat that is released at the depth z reaches the surface with the factor exp(-beta z). A wave of pressure of the
+wavenumber q strains an incompressible half space: the squares of all strains add up to a constant times `(q z)^2 exp(-2
+q z)`, which is the same under crests and troughs. So the heat that the wave dissipates has the distribution `4 q (q
+z)^2 exp(-2 q z) dz` over the depth, with the mean depth `3/(2 q)`. It reaches the surface with the factor
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
-The rubber that dissipates is at these depths, too, and has their mean temperature. With waves cos(m z) along the depth,
-whose share in this distribution is
+The rubber that dissipates is at the same depths, and its temperature is the mean over this distribution. For this mean,
+the temperature is written as a sum of waves cos(m z) along the depth. The share of such a wave in the distribution is
 
-    g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3,                                         (3)
+    g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3.                                         (3)
 
-heat of the body warms the depths where it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` instead of (1).
+Heat of the body then warms the depths at which it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` for a unit of
+heat, which replaces the factor 1/(kappa beta) of (1).
 
-A uniform heat has no steady state: after a sliding time t it has warmed a cold body by `2 q sqrt(t/pi)/e`, with the
-effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures in
-a periodic box are relative to its mean.
+A uniform heat has no steady state. After a sliding time t it has warmed a body that was cold by `2 q sqrt(t/pi)/e`,
+with the effusivity `e = kappa/sqrt(D)`; a wave has reached the share `erf(beta sqrt(D t))` of (1). For an infinite
+time, temperatures in a periodic box are relative to the mean of the box.
 
-Time steps: each wave (j, k) of the sum of exponentials (`physics.prony`), along the depth and along the surface,
-satisfies
+Time steps. The temperature is a sum of exponentials (`physics.prony`), whose terms j are waves along the depth with the
+rate m_j^2 and the weight w_j. The amplitude c of each wave j along the depth and k along the surface satisfies
 
-    dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
+    dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e.                                       (4)
 
-with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g =
-1; for heat of the body g is the share (3) of the wave m_j/sqrt(D) along the depth. The temperature at the depths where
-this heat is released is `sum_j w_j g_j c_j/e`.
+Within a step q is linear in time, and (4) is solved exactly. For heat on the surface g_j = 1; for heat of the body g_j
+is the share (3) for m = m_j/sqrt(D). The temperature at the depths at which this heat is released is `sum_j w_j g_j
+c_j/e`. The mean of the box (k = 0) has a sum of exponentials of its own, which is exact to 1e-9 at any time, so that no
+heat is lost.
 
-The mean of the box (k = 0) has a sum of its own, exact to 1e-9 at any time, so that no heat is lost.
+Free box. A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, causes at the
+distance (x, y) from the cell the rise (H. S. Carslaw, J. C. Jaeger, section 10.4)
 
-Free box: a uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, causes at the
-distance (x, y) from the cell the rise
+    K(x, y) = 1/e int_0^inf W(t) P(x + v_x t, dx, t) P(y + v_y t, dy, t) dt/sqrt(pi t),                           (5)
+    P(x, dx, t) = (erf((x + dx/2)/sqrt(4 D t)) - erf((x - dx/2)/sqrt(4 D t)))/2.
 
-    K(x, y) = 1/e int_0^inf W(t) P(x + v_x t, dx, t) P(y + v_y t, dy, t) dt/sqrt(pi t),                           (1)
-    P(x, dx, t) = (erf((x + dx/2)/sqrt(4 D t)) - erf((x - dx/2)/sqrt(4 D t)))/2,
+W is 1 for heat on the surface. For heat that waves of the wavenumber q dissipate, with tau = D t and s = 2 q sqrt(tau),
 
-with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for heat
-on the surface. For heat that waves of the wavenumber q dissipate, with tau = D t and s = 2 q sqrt(tau),
+    W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                       (6)
 
-    W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                  (2)
+which tends to 1 - 3/s^2 for large s. For the temperature at the depths at which heat is released, W is `sqrt(pi tau)`
+times `Depths.staying`. The integral (5) is a sum over panels, short enough for the passage of a cell and for the
+spreading of heat.
 
-which tends to 1 - 3/s^2. For the temperature at the depths where heat is released, W is `sqrt(pi tau)` times
-`Depths.staying`. Panels of the integral resolve the passage of a cell and the spreading of heat.
-
-Distribution over the contact: the heat of the interface is its shear stress times the sliding speed, on all points in
-contact. The heat of the body, dissipated by its branches, is distributed in proportion to the pressure.
+Distribution over the contact. The heat of the interface is its shear stress times the sliding speed, at all points in
+contact. The heat of the body, which its branches dissipate, is distributed in proportion to the pressure.
 """
 
 import math
@@ -95,23 +96,26 @@ class Conductor:
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths at which the body releases heat, given by the share that waves of each wavenumber [1/m] dissipate.
+    """Depths at which the body releases heat: waves of the `wavenumbers` [1/m] dissipate these `shares` of the heat,
+    both of shape (n,).
 
-    Integrals over waves along the depth replace (2), as they also hold for a finite time and for the temperature at
-    depth.
+    Temperatures are integrals over waves cos(m z) along the depth, not (2): such integrals hold also for a finite time,
+    and for the temperature at a depth.
     """
 
     wavenumbers: Array
     shares: Array
 
     def cosines(self, m: Array) -> Array:
-        """Return the shares (3) of waves cos(m z) along the depth, averaged over the dissipating waves."""
+        """Return the share (3) of each wave cos(m z) along the depth, averaged over the dissipating waves with their
+        shares of the heat. `m` [1/m] has any length, shape (k,), as has the result."""
         square = (0.5 * m / self.wavenumbers[:, None]) ** 2
         return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
 
     def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
-        """Return kappa times the temperature rise per heat [m] after diffusion over `reach = D t` [m^2], to 1e-5: on
-        the surface or, if `felt`, at the depths where heat is released."""
+        """Return the temperature rise for a unit of heat, multiplied by the conductivity [m], to 1e-5. Heat has
+        diffused for a time t, given as `reach = D t` [m^2]. The rise is that at the depths where heat is released if
+        `felt`, else that of the surface. `beta` [1/m] is that of (1), in any shape."""
         total = np.zeros_like(beta)
         for m, weight in zip(*self._waves(felt), strict=True):
             square = beta**2 + m**2
@@ -119,8 +123,8 @@ class Depths:
         return total
 
     def staying(self, tau: Array) -> Array:
-        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m], the heat that remains at its depths after diffusion over `tau =
-        D t` [m^2]."""
+        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m]. This is how much the heat still warms the depths where it was
+        released, after diffusion over `tau = D t` [m^2]."""
         total = np.zeros_like(tau)
         for m, weight in zip(*self._waves(True), strict=True):
             total += weight * np.exp(-(m**2) * tau)
@@ -181,12 +185,13 @@ def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice
 
 
 def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, velocity: Vector, prony: Prony) -> Depths:
-    """Return the depths at which a body sliding at `velocity` [m/s] dissipates under a pressure with this spectrum;
-    collective.
+    """Return the depths at which a body that slides at `velocity` [m/s] dissipates under the pressure with this
+    spectrum; collective.
 
-    `unit` [m] is the length unit of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with its compliance A and
-    frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. The heat is at most half the
-    thickness of the body deep.
+    A wave of pressure with the amplitude p^ and the frequency w loses the power `|p^|^2 A w Im(-1/G*(w))`, where A is
+    the compliance of the body to this wave and G* the complex modulus from `prony`. Waves are combined in bins, `BINS`
+    per octave, and each bin has the mean wavenumber of its waves. `unit` [m] is the length unit of the body. No heat is
+    released deeper than half the thickness of the body.
     """
     longest = max(body.size)
     bins = 1 + int(BINS * (1.0 + np.log2(np.hypot(fft.mx, fft.my))))
@@ -216,8 +221,9 @@ MEAN_TIMES, MEAN_ERROR = (
 
 @dataclass(frozen=True)
 class Heating:
-    """Heat in one step [W/m^2, mean over the box], each a pair for begin and end of the step: `rubbed` on points that
-    slip, and `pressed` in the body in proportion to the pressure, at `depths`."""
+    """Heat in one step [W/m^2, mean over the box]. Each pair holds the values at the beginning and at the end of the
+    step: `rubbed` is released on the surface at points that slip, and `pressed` in the body, at `depths`, in proportion
+    to the pressure."""
 
     rubbed: tuple[float, float] = (0.0, 0.0)
     pressed: tuple[float, float] = (0.0, 0.0)
@@ -225,13 +231,13 @@ class Heating:
 
     @property
     def whole(self) -> tuple[float, float]:
-        """The sum of both heats at the begin and at the end of the step [W/m^2]."""
+        """The sum of both heats at the beginning and at the end of the step [W/m^2]."""
         return self.rubbed[0] + self.pressed[0], self.rubbed[1] + self.pressed[1]
 
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
-    """Return g of the time steps (1) for waves with these `rates`, averaged over dissipating waves; 1 without
-    depths."""
+    """Return the factors g_j of (4) for waves along the depth with these `rates` [1/s], averaged over the dissipating
+    waves; 1 for heat on the surface, without depths."""
     return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
@@ -244,7 +250,8 @@ class MeanMemory:
 
     @property
     def stored(self) -> float:
-        """Heat stored in the body [J/m^2, mean over the box]: the longest wave along the depth, which never decays."""
+        """Heat that the body has stored [J/m^2, mean over the box], the amplitude of the longest wave along the depth,
+        which never decays."""
         return float(self.waves[0])
 
     def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
@@ -260,11 +267,10 @@ class MeanMemory:
 
 
 class HeatMemory:
-    """The waves of temperature (1) below a box of `size` [m], and the spectra of rubbing and pressure at the end of the
-    last step.
+    """The waves of temperature (4) below a box of `size` [m], and the spectra of the heat at the end of the last step.
 
-    Parameters: `fft`, a transform of the size of maps; `rubs`, True if heat is released on the surface, too, not only
-    in the body. The constructor and the methods are collective.
+    `fft` is a transform of the size of maps, `body` the conductor, and `known` the sum of exponentials. `rubs` is True
+    if heat is also released on the surface, and not only in the body. The constructor and the methods are collective.
     """
 
     def __init__(self, fft: FFT, size: Vector, body: Conductor, known: Exponentials, rubs: bool) -> None:
@@ -280,7 +286,9 @@ class HeatMemory:
         self.mean = MeanMemory(body)
 
     def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
-        """Set the maps of rubbing and pressure before the next step, multiplied by `scales`."""
+        """Set how heat is distributed at the beginning of the next step: on the surface in proportion to the map
+        `rubbed`, and in the body in proportion to the map `pressed`. `scales` are the factors by which both maps get
+        the mean 1."""
         if rubbed is not None:
             np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)
         np.multiply(self.fft.forward(pressed), scales[1], out=self.pressed)
@@ -288,11 +296,12 @@ class HeatMemory:
     def advance(
         self, dt: float, heating: Heating, rubbed: Array | None, pressed: Spectrum, scales: Vector, out: Array
     ) -> float:
-        """Advance by a step dt [s], at whose end the heat is distributed as `rubbed` and `pressed`. Put the temperature
-        rise of the surface [K] into `out`, and return the mean rise [K] where the body releases heat, weighted by this
-        heat.
+        """Advance by a step dt [s]. Put the temperature rise of the surface [K] into the map `out`, and return the mean
+        rise [K] at the depths where the body releases heat, weighted by this heat.
 
-        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` give both maps the mean 1.
+        At the end of the step the heat on the surface is distributed like the map `rubbed`, and the heat in the body
+        like the map of which `pressed` is the spectrum (the buffer of the transform or a copy). `scales` are the
+        factors by which both maps get the mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)
@@ -356,7 +365,7 @@ def sliding_heat_unbounded(
 
 
 def _covered(x: Array, dx: float, times: Array, body: Conductor) -> Array:
-    """Return P of (1), of shape (times, positions)."""
+    """Return P of (5), of shape (times, positions)."""
     from scipy.special import erf
 
     reach = np.sqrt(4.0 * body.diffusivity * times)[:, None]
@@ -364,7 +373,8 @@ def _covered(x: Array, dx: float, times: Array, body: Conductor) -> Array:
 
 
 def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: float) -> tuple[Array, Array]:
-    """Return times t [s], up to `time`, and their shares of `dt/sqrt(pi t)`, by Gauss panels in sqrt(t)."""
+    """Return times t [s], up to `time`, and their shares of `dt/sqrt(pi t)` in the integral (5), by Gauss panels in
+    sqrt(t)."""
     speed, smallest, longest = float(np.hypot(*velocity)), min(cell), 2.0 * float(np.hypot(*size))
     start = FIRST * smallest / max(speed, body.diffusivity / smallest)
     end = LAST * longest**2 / body.diffusivity
@@ -383,7 +393,7 @@ def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: 
 
 
 def _reaching(times: Array, body: Conductor, depths: Depths) -> Array:
-    """Return W of (2) at these times, averaged over the waves."""
+    """Return W of (6) at these times, averaged over the dissipating waves."""
     from scipy.special import erfcx
 
     total = np.zeros_like(times)
@@ -401,11 +411,11 @@ SLIP_BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is
 
 @dataclass(frozen=True)
 class Flash:
-    """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body.
+    """Temperature rises [K] of a contact where heat is released, on the surface and in the body, weighted by this heat.
 
-    `mean` is the flash temperature, `highest` the highest rise on the surface, `lower` and `upper` are the quartiles.
-    `of_rubber` is the highest rise at which rubber relaxes: the mean, or in bands, each at its own temperature, the
-    rise of the hottest band. With feedback, found in `rounds`, `friction_cold` is friction without feedback.
+    `mean` is the flash temperature, `lower` and `upper` are the quartiles, and `highest` is the highest rise on the
+    surface. In bands, `hottest_band` is the rise of the hottest band, else None. With feedback the temperatures are
+    found in `rounds` of steady states, the first of them for cold rubber: `friction_cold` is its friction.
     """
 
     mean: float = 0.0
@@ -429,11 +439,13 @@ def spread_over(slab: Slab, weights: Array, total: float) -> Array:
 
 
 def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: Array) -> float:
-    """Return the share of the heat of the interface that enters the rubber, so that both surfaces have the same mean
-    temperature over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
+    """Return the share of the heat of the interface that enters the rubber; the rest enters the counterbody. With this
+    share both surfaces have the same mean temperature over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937)
+    222); collective.
 
-    `own` and `counterbody` are the rises [K] that all of this heat would cause in the rubber and in the counterbody;
-    `other` is the rise of the rubber by other heat. The mean is weighted by `rubbed`.
+    If all heat of the interface entered the rubber, the rubber would warm by `own` [K]; if all entered the counterbody,
+    the counterbody would warm by `counterbody` [K]. Other heat warms the rubber by `other` [K]. All are maps, and their
+    means are weighted by the map `rubbed` of the heat of the interface.
     """
     sums = slab.sum(*(float((rise * rubbed).sum()) for rise in (own, other, counterbody)))
     whole = sums[0] + sums[2]

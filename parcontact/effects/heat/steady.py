@@ -1,7 +1,9 @@
-"""Temperatures of steady sliding: the map below the contact, and the one temperature at which all rubber relaxes.
+"""Temperatures of steady sliding: the map below the contact, and with feedback one temperature at which all rubber
+relaxes.
 
-The map is exact for the given heat (`effects.heat.solver`). With feedback all rubber relaxes as at the flash
-temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
+The map is exact for the given heat (`effects.heat.solver`). With feedback all rubber relaxes as at one temperature T.
+The heat of this steady state causes the flash temperature T_0 + F(T), where T_0 is the temperature of the cold body.
+Secants within a bracket find the T for which `T = T_0 + F(T)`. Each round of this search is a steady state.
 """
 
 import math
@@ -39,10 +41,11 @@ def find_temperatures(
     friction: float,
     velocity: Vector,
 ) -> tuple[Flash, Array]:
-    """Return the temperatures of a steady state, and this rank's rows of the map of rises [K]; collective.
+    """Return the temperatures of a steady state, and this rank's rows of the map of temperature rises of the surface
+    [K]; collective.
 
-    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `friction` is the
-    friction of the body, without the interface.
+    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `velocity` is in m/s.
+    `friction` is the coefficient of friction of the body, without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
     if not speed:  # no dissipation
@@ -72,8 +75,8 @@ def find_temperatures(
 
 
 class Feedback:
-    """Finds the fixed point of the flash temperature. The first round is for the cold body; a later search starts from
-    the last fixed point if only the velocity differs."""
+    """Finds the flash temperature that a steady state reproduces. The first round is for cold rubber. If only the
+    velocity differs from that of the last state, the second round starts from the flash temperature of that state."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
@@ -81,11 +84,12 @@ class Feedback:
     def solve_fixed_point(
         self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float, most: float = math.inf
     ) -> Point:
-        """Return the point `warmed(rise)` whose flash temperature is `rise` [K], to the relative `tolerance`, limited
-        to FINEST and COARSEST. `place` is the pressure and the temperature of the body.
+        """Return the point `warmed(rise)` whose own flash temperature is `rise` [K].
 
-        No rise above `most` [K], where the material's shift ends, is tried. Raises RunError if the fixed point is above
-        `most`, or is not found in MOST_ROUNDS rounds.
+        Both agree within the relative `tolerance`, or within FINEST if it is smaller, or COARSEST if it is larger.
+        `speed` is in m/s, and `place` holds the mean pressure [Pa] and the temperature of the cold body [deg C]. No
+        rise above `most` [K] is tried, where the material's shift ends. Raises RunError if the flash temperature is
+        above `most`, or does not settle in MOST_ROUNDS rounds.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -169,8 +173,8 @@ def describe_cold_state(speed: float, pressure: float, temperature: float) -> st
 
 
 def beyond_shift(speed: float, pressure: float, temperature: float, most: float, rise: float) -> UnsolvedError:
-    """Return the error of a fixed point above the rise `most` [K] at which the shift of the material ends, where
-    sliding warms the rubber by `rise` [K]."""
+    """Return the error of a steady state that is warmer than the material's shift covers. The shift ends at the rise
+    `most` [K]; rubber that relaxes at this rise would be warmed by `rise` [K], which is more."""
     return UnsolvedError(
         describe_cold_state(speed, pressure, temperature),
         f"the flash temperature is above {temperature + most:.4g} C, where the shift factors end; rubber of that "
@@ -204,8 +208,8 @@ WARN_FLASH_TEMPERATURES = Kind(
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
-    """Yield a warning if relaxing rubber has a flash temperature, in bands the highest one, outside its measured
-    range."""
+    """Yield a warning if the shift is an extrapolation at the flash temperature of any point (in bands, at the
+    temperature of the hottest band), as the temperature is outside the range that was measured."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
         return

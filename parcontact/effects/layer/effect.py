@@ -1,6 +1,7 @@
 """A layer of rubber on a rigid base: the section `body`, and the effect.
 
-The layer only changes the response of the surface to pressure; steps and their cost stay the same."""
+The layer changes only how the surface responds to pressure. The steps of a run, and their cost, stay the same.
+"""
 
 from __future__ import annotations
 
@@ -119,7 +120,8 @@ WARN_HIGH_FOR_A_LAYER = Kind(
 
 
 def doubt_span(job: Any, span: float) -> Iterator[Doubt]:
-    """Yield a warning if a surface is too high, unless the job says so without its heights, which span `span` [m]."""
+    """Yield a warning if a surface with the height `span` [m] from its lowest to its highest point is too high for the
+    layer. There is none if `doubts_of_layer` already warns without the heights of the surface."""
     if not any(_too_high(job, _least_height(job.surface))):
         yield from _too_high(job, span)
 

@@ -1,11 +1,12 @@
-"""A layer on a rigid base: the ratio of the displacement of its surface to that of a half space.
+"""A layer on a rigid base: how its surface moves under pressure, compared with the surface of a half space.
 
-The surface of a layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave of the
+The surface of a layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave p^ of the
 wavenumber q by
 
-    u^(q) = (1 - nu)/q S(q d) p^(q).
+    u^(q) = (1 - nu)/q S(q d) p^(q),
 
-If the layer is bonded to the base, with kappa = 3 - 4 nu,
+where S is the ratio of this displacement to that of a half space. If the layer is bonded to the base, with kappa = 3 -
+4 nu,
 
     S(x) = (kappa sinh 2x - 2x) / (kappa cosh 2x + 2x^2 + 5 - 12 nu + 8 nu^2),
 
@@ -17,17 +18,23 @@ A uniform pressure p strains the layer in one direction only, and moves its surf
 incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms (1951);
 for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 
-Pressure waves that are long compared with the thickness of a layer need another part, within the contact. They displace
-a layer by `u = c0 p - c2 laplace p`; a bonded incompressible layer, which flows along its base like a viscous film, has
-c0 = 0. There long waves are far stiffer than the softest wave. A preconditioner K of the whole box must limit their
-stiffness to that of the softest wave, because p vanishes outside contact, and patches of contact further from each
-other than the thickness do not interact. The missing part is the inverse of the equation above on the contact,
+The solver of contacts needs a preconditioner, which turns a residual r, a displacement, into a pressure z. A
+preconditioner K for waves in the whole box is not enough for waves that are long compared with the thickness of a
+layer. These waves displace a layer by
+
+    u = c0 p - c2 laplace p,
+
+where c0 = 0 for a bonded incompressible layer, which flows along its base like a viscous film. Under this pressure the
+layer is far stiffer than for its softest wave. Yet K must limit the stiffness of long waves to that of the softest
+wave: the pressure vanishes outside contact, and patches of contact do not interact if they are further from each other
+than the thickness. So a second part is added to K z, which acts within each patch. It solves the equation above for the
+pressure on the contact,
 
     c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
 
 with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle over cells of
-two by two cells approximates it. It starts with cells of half the thickness, as K inverts shorter waves, and makes a
-damped Jacobi step on the way to larger cells and another one on the way back, so that it is symmetric. Maps are in
+two by two cells approximates the solution. It starts with cells of half the thickness, as K treats shorter waves, and
+makes one damped Jacobi step on the way to larger cells and one on the way back, so that it is symmetric. Maps are in
 single precision.
 """
 
@@ -63,9 +70,11 @@ SAME = 1e-9  # accuracy: relative difference below which two lengths are equal
 
 @dataclass(frozen=True)
 class LongWaves:
-    """Compliance `c0 + c2 q^2` of long waves on a layer, in a box of `size`; lengths have one unit.
+    """The compliance `c0 + c2 q^2` of long waves on a layer of this `thickness`, in a box of this `size`. All lengths
+    have the same unit, which may be any.
 
-    It corrects a preconditioner in which these waves are as soft as the layer's softest wave.
+    A preconditioner for waves in the whole box treats these waves as if they were as soft as the softest wave of the
+    layer; `LongWavePreconditioner` corrects this.
     """
 
     c0: float
@@ -114,14 +123,18 @@ class Layer(Response):
         return float(q[softest]), float(stiffness[softest])
 
     def stiffness(self, q: Array) -> Array:
-        """Return the ratio of pressure to displacement of waves. Waves that are longer than the softest wave get its
-        stiffness: they would join patches of contact. `LongWavePreconditioner` accounts for their higher stiffness
-        within patches."""
+        """Return the ratio of pressure to displacement for waves with the wavenumbers q, for a preconditioner.
+
+        Waves that are longer than the softest wave get the stiffness of the softest wave. With their own, higher
+        stiffness they would couple patches of contact that do not interact; `LongWavePreconditioner` adds this
+        stiffness within patches.
+        """
         softest, stiffness = self.softest_wave
         return np.where(q < softest, stiffness, super().stiffness(q) / self.compliance_ratio(q))
 
     def reach(self, size: Vector) -> float:
-        """Return the thickness, or half of it if the layer is nearly rigid to long waves."""
+        """Return the distance over which the pressure at a point matters to a preconditioner: the thickness, or half of
+        it if the layer is nearly rigid to long waves."""
         return self.thickness * (1.0 if self.long_waves(size) is None else 0.5)
 
     def preconditioner(self, size: Vector) -> Callable[..., Any] | None:
@@ -129,11 +142,12 @@ class Layer(Response):
         return None if waves is None else partial(LongWavePreconditioner, waves)
 
     def long_waves(self, size: Vector) -> LongWaves | None:
-        """Return the compliance of waves in a box that are longer and stiffer than the softest wave; None if they are
-        hardly stiffer, or do not exist.
+        """Return the compliance of those waves in a box that are longer than the softest wave. Return None if they are
+        hardly stiffer than the softest wave, or if the box is too small for such waves.
 
-        The compliance of long waves on a bonded layer is `mean_compliance` plus, to second order in q, `d^3 ((3 - 4
-        nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible layer.
+        With the wavenumber q, the compliance of long waves on a bonded layer is, to second order in q, `mean_compliance
+        + q^2 d^3 ((3 - 4 nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`. For an incompressible layer this is `q^2
+        d^3/3`.
         """
         nu, softest, stiffness = self.poisson, *self.softest_wave
         least = stiffness * self.mean_compliance
@@ -186,8 +200,8 @@ def _sinh_beyond(y: Array) -> Array:
 
 
 class LongWavePreconditioner:
-    """An extended preconditioner plus the part for long waves. It holds four maps in single precision on each grid of
-    cells."""
+    """A preconditioner for waves in the whole box, extended by the part for long waves within contact. It holds four
+    maps in single precision on each grid of cells."""
 
     def __init__(self, waves: LongWaves, slab: Slab, extended: ExtendedPreconditioner) -> None:
         self._extended, self._levels = extended, cell_levels(slab)
@@ -208,7 +222,8 @@ class LongWavePreconditioner:
         ]
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
-        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
+        """Replace the residual r by the pressure z; collective. `working` is not 0 at the points whose pressure the
+        solver changes at present: r must be 0 elsewhere, and z has a meaning only there."""
         self._weigh(working)
         if not self._first:
             self._given[0][...] = r

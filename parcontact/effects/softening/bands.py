@@ -1,4 +1,5 @@
-"""Strains of bands in steady sliding, by all bands together, and the fixed point on which they settle."""
+"""Strains of bands in steady sliding: the waves of all bands strain each band, and strains and moduli are found in
+rounds."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +21,8 @@ from .steady import SHARE, Vector, depths_between, strains_of
 
 
 class StrainProbe:
-    """Measures the squares S(z) of the strain in a band's contacts at all depths, and their weights in its strain."""
+    """Measures in the contacts of a band the mean square strain S(z) at all depths, and the weights of S(z) in the
+    square of the strain of this band (`effects.softening.steady`)."""
 
     means: ClassVar[Means] = {"squares": by_power, "strain_weights": by_power}
 
@@ -28,17 +30,18 @@ class StrainProbe:
         self._depths = depths_between(float(cut.edges[0]), float(cut.edges[-1]))
 
     def slide(self, setup: Setup, velocity: Vector) -> None:
-        """Do nothing: the measure does not depend on the velocity."""
+        """Do nothing, as this probe prepares nothing for a velocity."""
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
-        """Return the squares and weights of a contact."""
+        """Return the mean squares S(z) as `squares`, and their weights as `strain_weights`, for a contact; both have
+        the shape (depths,)."""
         depths, all_waves = self._depths / setup.units.length, np.zeros(setup.fft.shape, np.int64)
         found = strains_of(setup, contact.u, velocity, depths, all_waves, 1)
         return {"squares": found.squares, "strain_weights": found.weights[0]}
 
 
 def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
-    """Yield the measure of strains if the job has softening."""
+    """Yield the probe that measures the strains of bands, if the job has a `softening` section."""
     if job.section("softening") is not None:
         yield StrainProbe(job, cut)
 
@@ -59,7 +62,7 @@ class StrainsOfBands:
         self._enough = SHARE * job.numerics.asked.both[0]
 
     def begin(self, road: RoadSliding) -> None:
-        """Do nothing: a state starts from the strains of the last state."""
+        """Do nothing. The strains of the last state are kept, from which the new state starts."""
 
     def act(self, road: RoadSliding) -> None:
         road.set_factors(self._table.at, self._strains.tolist())
@@ -82,12 +85,12 @@ class StrainsOfBands:
 
 
 def _strains_in(results: Results) -> Array:
-    """Return the strain of each band, by the waves of all bands."""
+    """Return the strain of each band [-], which the waves of all bands cause, shape (bands,)."""
     squares = np.sum([result.found["squares"] for result in results], axis=0)
     return np.sqrt([result.found["strain_weights"] @ squares for result in results])
 
 
 def loops(job: Job, cut: Cut) -> Iterator[StrainsOfBands]:
-    """Yield the loop over strains if the job has softening."""
+    """Yield the loop that finds the strains of bands, if the job has a `softening` section."""
     if job.section("softening") is not None:
         yield StrainsOfBands(job, cut)

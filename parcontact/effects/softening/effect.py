@@ -80,7 +80,8 @@ class Softening(Part):
 
 
 def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
-    """Yield an error for jobs with a history: `f G' + i g G''` is no Prony series, so that it has no memory in time."""
+    """Yield an error for jobs with a history. The softened modulus `f G' + i g G''` is no Prony series, so that no
+    relaxation function of the body in time is known."""
     if softening is None:
         return
     if history:
@@ -119,7 +120,7 @@ RULES = rules_of(only_in_steady_sliding, in_a_periodic_box, of_rubber)
 
 
 class SofteningEffect(Effect[None]):
-    """Effect of strain softening. Jobs with a history are refused, so that no march creates it."""
+    """Effect of strain softening. It has no part in steps: jobs with a history are refused."""
 
     section: ClassVar[type[Part]] = Softening
     in_curves: ClassVar[bool] = True
@@ -137,7 +138,7 @@ class SofteningEffect(Effect[None]):
 
     @staticmethod
     def curve_options(job: Any) -> Iterator[str]:
-        """Yield the requirements of columns of friction curves that the job meets."""
+        """Yield the option for which friction curves have further columns (`Column.when`): softening."""
         yield "softening"
 
     @staticmethod

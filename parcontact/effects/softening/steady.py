@@ -1,26 +1,29 @@
 """Amplitude of the shear strain that softens each wave of a rough contact, in steady sliding.
 
-A wave of the surface displacement with the amplitude A and the wavenumber q strains an incompressible half space at
-the depth z by a tensor e that turns with the constant magnitude
+A wave of the surface displacement, with the amplitude A and the wavenumber q, strains an incompressible half space. At
+the depth z the strain tensor e turns as the wave passes, and its magnitude stays constant:
 
     gamma(z) = sqrt(2 e:e) = 2 q A (q z) exp(-q z).                                                               (1)
 
-The strain is local: it counts where power is dissipated. With the dissipated power d(x, z) of a map of displacements,
+In a rough contact the strain of all waves differs from place to place, and counts where power is dissipated. Let
+gamma(x, z) be the strain and d(x, z) the dissipated power at the place x in the depth z, and let <> be the mean over x.
+Then
 
-    S(z) = <d gamma^2>/<d>/R(z),                                                                                  (2)
+    S(z) = <d gamma^2>/<d>/R(z)                                                                                   (2)
 
-where R is the ratio <d gamma^2>/(<d> <gamma^2>) of waves with the same amplitudes and independent phases. In full
-contact S is the sum of gamma^2 over all waves. The strain of a wave is a mean over depth, weighted by its dissipation,
+is the mean square strain at the depth z, weighted by power. Waves with independent phases would also have `<d
+gamma^2>/(<d> <gamma^2>)` above 1; R is this ratio for waves with the amplitudes of the contact and independent phases.
+In full contact phases are independent, and S is the sum of gamma^2 over all waves. The strain of one wave is a mean
+over the depths at which it dissipates,
 
     gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
 
-which for one wave is 3/8 (q A)^2. The strain of an octave, or of a band, is the mean of (3) over its waves, weighted by
-their power. S(z) of bands add up.
+which is 3/8 (q A)^2 if there is no other wave. The square of the strain of an octave, or of a band, is the mean of (3)
+over its waves, weighted by their power. S(z) of a surface is the sum of the S(z) of its bands.
 
-Strains and softened moduli of a steady state depend on each other, and are found as a fixed point.
-
-A round solves the state with the factors of the last strains, and finds its new strains. Strains change by a power
-mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less than a share of the accuracy.
+Strains depend on the moduli of a steady state, and moduli on the strains. They are found in rounds: a round solves the
+state with the moduli at the last strains, and finds new strains. The strains for the next round are the power mean
+`gamma_new^0.7 gamma^0.3`. Rounds end when friction changes by less than a part of the job's accuracy.
 """
 
 import math
@@ -49,28 +52,33 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class StrainsAtDepth:
-    """Strains under a map of displacements. `squares` are S(z) [-] at given depths z, shape (depths,); `weights` are
-    the weights of S(z) in the strain of each octave (3), shape (octaves, depths); `power` is the power of each octave,
-    up to a common factor."""
+    """Strains under a map of displacements.
+
+    `squares` are S(z) [-] at the depths z, shape (depths,). `weights` are the weights of S(z) in the square of the
+    strain of each octave (3), shape (octaves, depths). `power` is the power of each octave, shape (octaves,), up to a
+    common factor.
+    """
 
     squares: Array
     weights: Array
     power: Array
 
     def of_octaves(self, otherwise: Array) -> Array:
-        """Return the strain [-] of each octave; for an octave without power its value in `otherwise`."""
+        """Return the strain [-] of each octave, shape (octaves,). An octave without power gets its value in
+        `otherwise`."""
         found = np.sqrt(self.weights @ self.squares)
         return np.where(found > 0.0, found, otherwise)
 
 
 def depths_between(low: float, high: float) -> Array:
-    """Return depths for the strains of waves between two wavenumbers, in the inverse of their unit."""
+    """Return the depths at which strains are needed for waves between the wavenumbers `low` and `high`. If these are in
+    1/m, the depths are in m."""
     ends = np.log(SHALLOW / BEYOND / high), np.log(DEEP * BEYOND / low)
     return np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / math.log(SPACING))))
 
 
 def ends_of(setup: Setup) -> Vector:
-    """Return the smallest and the largest wavenumber of the grid [1/unit of length]."""
+    """Return the smallest and the largest wavenumber of the grid, in 1 over the run's unit of length."""
     cells = setup.slab.nx / setup.size[0], setup.slab.ny / setup.size[1]
     return 2.0 * math.pi / max(setup.size), math.pi * math.hypot(*cells)
 
@@ -78,10 +86,10 @@ def ends_of(setup: Setup) -> Vector:
 def strains_of(
     setup: Setup, u: Array, velocity: Vector, depths: Array, octave: NDArray[np.int64], count: int
 ) -> StrainsAtDepth:
-    """Return the strains at these depths [unit of length] under a surface that slides at this velocity [m/s];
-    collective.
+    """Return the strains at these depths under a surface that slides at this velocity [m/s]; collective.
 
-    The displacement u is in the run's units. `octave` is the number of the octave of each wave, below `count`.
+    The displacement u, a map, and the depths are in the run's units. `octave` has the number of the octave of each
+    wave, in the shape of a spectrum; numbers are below `count`.
     """
     q = np.hypot(*wavenumbers(setup.fft, setup.size))
     spectrum = setup.fft.forward(u) * (setup.units.height / setup.units.length)
@@ -138,7 +146,8 @@ def _square_at(setup: Setup, spectrum: Spectrum, power: Array, q: Array, depth: 
 
 
 def _squared(setup: Setup, waves: Spectrum) -> Array:
-    """Return the map of `2 e:e` for waves in proportion to the displacement; (1) with `z exp(-q z)` times it."""
+    """Return the map of `2 e:e` for displacement waves with the spectrum `waves`. The caller multiplies the spectrum by
+    `z exp(-q z)` to get gamma^2 of (1) at the depth z."""
     fft, out, total = setup.fft, setup.slab.empty(), setup.slab.zeros()
     for weight, symbol in _components(setup):
         np.multiply(waves, symbol, out=fft.spectrum)
@@ -147,7 +156,8 @@ def _squared(setup: Setup, waves: Spectrum) -> Array:
 
 
 def _components(setup: Setup) -> Iterator[tuple[float, NDArray[Any]]]:
-    """Yield the components of the strain: their weights in `2 e:e`, and symbols."""
+    """Yield the components of the strain tensor: the weight of each in `2 e:e`, and the factor by which its spectrum
+    differs from that of the displacement, for each wave."""
     qx, qy = wavenumbers(setup.fft, setup.size)
     q = np.hypot(qx, qy)
     flat = [direction for direction, points in ((qx, setup.slab.nx), (qy, setup.slab.ny)) if points > 1]
@@ -159,10 +169,11 @@ def _components(setup: Setup) -> Iterator[tuple[float, NDArray[Any]]]:
 
 
 def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> float:
-    """Return R of (2) from fourth moments of waves with independent phases.
+    """Return R of (2) for waves with independent phases, from their fourth moments.
 
-    With the vectors E and W of weighted components, whose squares are gamma^2 and d, it is
-    `1 + (2 sum_ij <E_i W_j>^2 - sum_k <E^2>_k <W^2>_k)/(<E^2> <W^2>)`, with the waves k.
+    Let the components of the vector E be those of the strain, and of the vector W those of the strain times the root of
+    a wave's power, both weighted so that E^2 = gamma^2 and W^2 = d. Then R is `1 + (2 sum_ij <E_i W_j>^2 - sum_k
+    <E^2>_k <W^2>_k)/(<E^2> <W^2>)`, with a sum over the waves k.
     """
     counts = setup.fft.multiplicity
     q = np.hypot(*wavenumbers(setup.fft, setup.size))
@@ -203,8 +214,8 @@ class Round:
 
 
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
-    """Solve rounds, beginning with the factors of `first`, until friction changes by less than SHARE of `accuracy`, or
-    factors do not change. Raises RunError if friction does not settle."""
+    """Solve rounds until friction changes by less than the fraction SHARE of `accuracy`, or until the factors of the
+    moduli do not change. The first round uses the factors of `first`. Raises RunError if friction does not settle."""
     softened, last = first, math.nan
     for _ in range(MOST_ROUNDS):
         found = solve(softened)

@@ -40,13 +40,14 @@ class StrainTable:
 
     @staticmethod
     def mixed(found: ArrayLike, before: ArrayLike) -> Array:
-        """Return the strains for the next round of a fixed point, from the strains `found` and `before`; a strain that
-        was not found (NaN or 0) remains."""
+        """Return the strains for the next round, from the strains `found` in this round and the strains `before` it. If
+        a strain was not found (NaN or 0), the one before stays."""
         new, old = np.asarray(found, float), np.asarray(before, float)
         return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
 
     def at(self, strain: float) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function that maps wavenumbers to the factors of this strain, equal for all waves."""
+        """Return a function that takes wavenumbers, and returns for each of them the factors f and g at this `strain`
+        [-]."""
         return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:
@@ -88,11 +89,13 @@ def octave_of(q: Array, longest: float) -> NDArray[np.int64]:
 
 
 def strains_in_full_contact(q: Array, slopes: Array, group: NDArray[np.int64], count: int) -> Array:
-    """Return the strain [-] of each group of waves in full contact, from the mean square slopes of waves with the
-    wavenumbers q, shape (n,), and the number of their group, below `count`; NaN for a group without waves.
+    """Return the strain [-] of each group of waves in full contact, shape (count,), from the mean square slopes of
+    waves with the wavenumbers q, both of shape (n,). `group` has the number of each wave's group, below `count`. The
+    strain of a group without waves is NaN.
 
-    A wave has, with r = k_j/q, `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square
-    slope.
+    All waves j strain the rubber in which the wave of wavenumber q dissipates. With r = k_j/q the square of the strain
+    of this wave is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`, where `(k_j A_j)^2` is twice the mean square slope
+    of the wave j.
     """
     ratio = q / q[:, None]
     squares = (24.0 * slopes * ratio**2 / (1.0 + ratio) ** 5).sum(axis=1)
@@ -111,10 +114,11 @@ EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
 
 def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
-    """Return the factors in a file of a strain sweep, and a sentence on the strain at which they are 1, '' for factors.
+    """Return the factors in the file of a strain sweep, and a sentence on the strain at which they are 1; the sentence
+    is '' if the file has factors.
 
-    Moduli are divided by their values at the strain `reference` [-], by default in the first row. Raises InputError
-    with the file and what was expected.
+    If the file has moduli, they are divided by their values at the strain `reference` [-], which is by default the
+    smallest strain. Raises InputError with the file and what was expected.
     """
     table = read_named_columns(path, f"a strain sweep ({EXAMPLE})", EXAMPLE, NAMES, _is_header, PLAIN)
     pair = next((pair for pair in (FACTORS, *PAIRS) if {"strain", *pair} <= table.columns.keys()), None)
