@@ -1,1 +1,1 @@
-"""Friction of a whole road: its spectrum in bands, each on its own grid, coupled by statistics."""
+"""Friction of a whole road: its spectrum is divided into bands, each on its own grid. Statistics couple the bands."""

@@ -40,10 +40,10 @@ SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 class BandOutcome:
     """Results of all bands.
 
-    `results` with the laws of finer bands, from all samples; friction and area of the first sample with these laws, and
-    without (`hard`); standard errors of friction and area by the `scatter` of surfaces; the rungs of each band; `line`:
-    surfaces are profiles; error of friction by the `memory` of rungs in a history.
-    """
+    `results` are the mean results of all samples, with the laws of finer bands. `with_laws` has friction and corrected
+    area of the first sample with these laws, `hard` the same without them. `scatter` has the standard errors of
+    friction and area between surfaces, `rungs` the rungs of each band. `line` is True if the surfaces are profiles.
+    `memory` is the error of friction in a history because rungs remember pressures that the rubber did not have."""
 
     results: Results
     with_laws: tuple[float, float]
@@ -224,7 +224,7 @@ class RoadSliding:
 
     @property
     def own_temperature(self) -> float:
-        """The temperature of cold rubber [deg C]; NaN without a shift."""
+        """The temperature of the rubber [deg C] without heat of friction; NaN if the material has no shift."""
         return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:

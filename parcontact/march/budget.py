@@ -5,14 +5,16 @@ much smaller. Each source estimates a relative error from numbers of a step, wit
 (`time_error.Fit`). N is the number of spots of contact, and c is the relative excess of the counted area over
 the corrected one.
 
-solver: for friction proportional to the `complementarity` C of the certificate (`physics.records`), and smaller for
-many spots. Where friction is far below the slopes, it is a small difference of large forces: errors of pressures then
-count more, by the root of the ratio, and pressures with the error C may have tangential forces of NOISE C times the
-slopes. Friction by energy is a sum of squares: it is not known below the square of SINGLE, to which pressures are
-rounded. For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
+solver: the error of friction is proportional to the `complementarity` C of the certificate (`physics.records`), and
+divided by N^(1/4), as errors of many spots average out. Where friction is far below the slopes, it is a small
+difference of large forces. Errors of pressures then count more, by the root of the ratio, and they cause a tangential
+force of up to NOISE C times the rms slope, relative to the load. Friction by energy is a sum of squares. As pressures
+are rounded to single precision, with the relative rounding SINGLE, it is not known below the square of SINGLE. The
+error of the area is the share of points that penetrate without pressure, plus a small error that varies as C^0.7.
 
 time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded pair
-(`time_error`). folded: the bound for the branches without a map; for the area times the open share.
+(`time_error`). folded: the bound on the errors of friction by the branches without a map; the error of the area is this
+bound times the share of the box that is not in contact.
 
 mesh: for the area AREA c/N^(1/4) while the surface slides and errors of its positions average out; at rest and in
 steady sliding with STILL instead of AREA, and at least one cell. For friction in a march, VIEWS times the difference
@@ -107,7 +109,8 @@ class ErrorPair:
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """A source of error: its name, a remedy, and a function that returns its errors of friction and area for a step."""
+    """A source of error: its name, a remedy, and the function `error`, which returns the relative errors of friction
+    and area that the source causes in a step."""
 
     name: str
     remedy: str
@@ -230,7 +233,8 @@ ROUNDED = 1.01  # accuracy: least ratio of an error to its limit that counts as 
 SUMS = "sums"  # its name in a checkpoint
 SMALLER = "a smaller numerics.accuracy"  # the remedy if the accuracy has chosen the setting
 OF_BANDS = {
-    "method": "fewer bands with more points each (bands.count)",
+    "method": "fewer bands with more points each (bands.count); two or more bands have at least 3 % in friction and "
+    "9 % in a small area",
     "scatter": "more surfaces of each band (bands.samples)",
 }
 REMEDIES = {source.name: source.remedy for source in MARCH_SOURCES} | OF_BANDS
@@ -282,7 +286,8 @@ class ErrorBudget:
         return replace(self, friction=friction)
 
     def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
-        """Return the budget with the relative errors by the rounds of a fixed point added to the solver's part."""
+        """Return the budget with further relative errors of friction and area, which the last round of a fixed point
+        shows, added to the part of the solver."""
         own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
         return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
 
@@ -337,7 +342,8 @@ def weight_of(slid: float, seconds: float) -> float:
 
 @dataclass(frozen=True)
 class ErrorSums:
-    """Sums of the budgets of many steps, weighted by the distance slid; friction also by its value.
+    """Sums of the budgets of many steps, weighted by the distance slid; the errors of friction are weighted by the
+    friction coefficient, too.
 
     At rest the weight is proportional to the duration, and much smaller, so that rest does not dilute the errors of a
     slide; it is still smaller for steps without duration. `sums` has a row for friction and one for the area: the

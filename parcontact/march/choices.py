@@ -24,7 +24,7 @@ Verdict = tuple[bool, str]  # True if an effect is on, and the reason
 
 
 class Decided(cached_property[Decision]):
-    """A decision, made at its first use. `parcontact plan` prints all decisions in the order of their code."""
+    """A decision, made at its first use. `parcontact plan` prints all decisions in the order of this file."""
 
 
 def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
@@ -64,7 +64,7 @@ class Choices:
 
     @cached_property
     def effects(self) -> dict[str, type[Effect[Any]]]:
-        """Effects that further sections of the job turn on, by their names in checkpoints."""
+        """Effects that are on, each by a section of its own in the job, by their names in checkpoints."""
         known = listing.effects_of(type(self.job).model_fields)
         found = [guarded(section, effect) for section, effect in known.items()]
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
@@ -92,7 +92,7 @@ class Choices:
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
-        """Shear friction of the contact area, one entry for each effect that adds some."""
+        """Laws of the shear stress in the contact area, one for each effect that has such a law."""
         found = [effect.shear(self.job) for effect in self.effects.values()]
         return tuple(shear for shear in found if shear is not None)
 
@@ -108,7 +108,8 @@ class Choices:
 
     @decided("viscoelasticity")
     def viscoelasticity(self) -> Verdict:
-        """Decision on memory of a viscoelastic body: one map per relaxing branch, and the last displacement."""
+        """Decision to store the memory of a viscoelastic body: one map per relaxing branch, and the last
+        displacement."""
         count = self.prony.moduli.size
         what = "a branch relaxes" if count == 1 else f"{count} branches relax"
         return count > 0, what if count else "the body has one modulus and no memory"
@@ -124,7 +125,7 @@ class Choices:
 
     @decided("isolated contact")
     def isolated(self) -> Verdict:
-        """Decision on a free box, whose padded transforms are four times as large."""
+        """Decision to calculate in a free box, whose padded transforms are four times as large."""
         free = not all(self.grid.cyclic)
         return free, f"the boundary is {listing.text(self.grid.boundary)}" + ": padded" * free
 
@@ -149,13 +150,14 @@ class Choices:
 
     @decided("sliding")
     def sliding(self) -> Verdict:
-        """Decision on a surface that moves along the body."""
+        """Decision to move the surface along the body."""
         moves = self.timeline.moves
         return moves, "the surface moves" if moves else "the surface does not move in any stage"
 
     @decided("sub-cell or oblique sliding")
     def part_cells(self) -> Verdict:
-        """Decision to compute heights again after each motion, except by whole cells along x on a periodic box."""
+        """Decision to compute heights again after each motion, except after motions by whole cells along x of a
+        periodic box."""
         if not self.sliding.on:
             return False, "the surface does not move"
         if self.isolated.on:
@@ -175,8 +177,8 @@ class Choices:
 
     @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
-        """Decision to store two earlier pressures: steps of 1/3 or 1/4 cell start from the pressure one whole cell
-        earlier."""
+        """Decision to store two more pressures, of three and four steps ago: steps of 1/3 or 1/4 cell start from the
+        pressure one whole cell earlier."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
         on = self.extrapolated_starts.on and self.timeline.chooses and moves
         return on, f"the surface slides in {'' if on else 'no '}chosen steps"
@@ -189,7 +191,8 @@ class Choices:
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:
-        """Decision to make one step to the end of a stage at rest of a body without memory, once nothing changes."""
+        """Decision to make a single step to the end of a stage at rest, once the contact no longer changes. The body
+        must have no memory."""
         if self.prony.moduli.size:
             return False, "the body relaxes"
         if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
@@ -211,7 +214,8 @@ class Choices:
 
     @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
-        """Decision to use a preconditioner in single precision with its own transforms, without further iterations."""
+        """Decision to use a preconditioner in single precision with its own transforms. Solves then take as many
+        iterations as in double precision."""
         if reason := self.forbidden(SINGLE):
             return False, reason
         if self.numerics.precision != "double":
@@ -248,7 +252,8 @@ class Choices:
 
     @property
     def transforms(self) -> list[Any]:
-        """Facts that, with the number of ranks, determine the transforms of a run; a restart compares them."""
+        """Settings that determine the transforms of a run together with the number of ranks. A restart compares
+        them."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
         single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
         return [*kinds, single, [self.job.initial.state, steady]]

@@ -148,7 +148,7 @@ class CurveTable:
         )
 
     def lose(self, at: Wanted, why: str) -> None:
-        """Store a point that could not be solved and the reason `why`, unless it is in the table; raises OSError."""
+        """Record a point that could not be solved, and the reason `why`, unless it is in the table; raises OSError."""
         self._lost = tables.without([*tables.without(self._lost, [at]), LostPoint(at, why)], self.known)
         tables.write(self.path.parent, self._lost)
 

@@ -62,7 +62,7 @@ class Loaded(Protocol):
 
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     """Return a guess of the contact for each load and speed of a job, whose shortest wave is `wave` [m] and whose box
-    has the `area` [m^2]. Slow sliding only occurs in friction curves."""
+    has the `area` [m^2]. Contacts in slow sliding are guessed only for friction curves."""
     from ..effects.branches import relaxation_of
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
@@ -164,7 +164,8 @@ def _of_any_stage(stage: Any) -> Any:
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Replace all words for the grid in the source of a job by numbers. Return the origin with a sentence on them."""
+    """Replace words such as `auto` for the grid in the source of a job by numbers. Return the origin of the job with a
+    sentence on this choice."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
 

@@ -67,7 +67,8 @@ def refuse_memory(job: Job) -> None:
 
 
 def is_quickly_made(job: Job) -> bool:
-    """Return True if warnings depend on the heights of a job, and these are few enough to be computed for them."""
+    """Return True if warnings depend on the heights of a job, and the grid has few enough points to compute the heights
+    for these warnings alone."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 

@@ -45,10 +45,11 @@ from .time_error import RunProperties, properties_of
 class Setup:
     """The parts that every calculation on a job shares: choices, slab, surface, units and body.
 
-    `heights` [m] is the range of the surface, `height` its span (the shorter side of a cell if it is flat); `shortest`
-    [m] is the shortest measured wave, or None; `size` and `prony` are the box and the relaxation function in the run's
-    units (and seconds); `remarks` are notes on measured maps; `factors` computes the moduli of softened rubber
-    (`physics.halfspace`).
+    `heights` is the range of heights of the surface. `height` [m] is their span, or the shorter side of a cell if the
+    surface is flat. `shortest` [m] is the shortest wave of a measured map, None without a map. `size` is the box, and
+    `prony` the relaxation function, in the run's units and seconds. `remarks` are notes on measured maps and warnings
+    about them. `factors` returns the factors of the moduli of softened rubber as a function of the wavenumber, None
+    without softening (`physics.halfspace`).
     """
 
     choices: Choices
@@ -134,8 +135,8 @@ class Scene:
         return self.setup.units
 
     def relax(self, memories: Memories) -> None:
-        """Multiply the relaxation times of body, energies and interface at the job's temperature by the product of the
-        effects' factors, which follow from their memories. Raises RunError."""
+        """Set all relaxation times to those at the job's temperature, multiplied by the factors of the effects, which
+        follow from their `memories`. Raises RunError."""
         factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
         if factor == self.time_factor:
             return

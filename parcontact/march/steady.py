@@ -211,7 +211,7 @@ class SteadySliding:
             self.temperature = temperature
 
     def set_material(self, temperature: float) -> None:
-        """Set the material to a temperature [deg C] for the next solve only."""
+        """Set the temperature [deg C] of the material for the next solve only."""
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
         self.probe = self.setup.probe()
 
@@ -260,8 +260,8 @@ class SteadySliding:
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or an effect's map, last
-        state."""
+        """Return, for the last state, this rank's rows of `pressure` [Pa], of `displacement`, `gap` or `height` [m], or
+        of a map of an effect."""
         assert self.contact is not None
         for loop in self.loops:
             if name in loop.fields:
@@ -362,7 +362,8 @@ class SteadySliding:
 def judge_state(
     setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return friction from the dissipated power, including an interface, and the errors of friction and area."""
+    """Return friction, and the relative errors of friction and area. Friction is the sum of `by_energy`, from the
+    dissipated power, and the friction of an interface."""
     friction = by_energy + measures.friction_interface
     seen = StepObservation(
         certificate.complementarity,

@@ -219,8 +219,8 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
-    """Return the radius of round spots of contact, or of the gaps between them if these are smaller, in cells of mean
-    sides; half the width of strips; infinite without edges."""
+    """Return the mean radius of spots of contact, in cells of mean sides. Gaps between spots count instead if their
+    area is smaller. If edges follow the grid, return half the width of strips; return infinity without edges."""
     sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
     if sides <= 0.0:
         return math.inf

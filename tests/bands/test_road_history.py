@@ -120,11 +120,13 @@ def test_rungs_that_remember_another_pressure_state_an_error(monkeypatch: pytest
     """It fades with the imprint of a rest: rubber stiffens, and the mean pressure on the fine band rises. Steady
     sliding has none. A slide that ends before the fine band settles states at least what a longer one does."""
 
+    own = road_history.MEMORY
+
     def memory(**changes: Any) -> tuple[Array, Array]:
         road = history(**changes)
         slips = [row.distance for row in rows_of(road)]
         each = []
-        for share in (0.5, 0.0):
+        for share in (own, 0.0):
             monkeypatch.setattr(road_history, "MEMORY", share)
             parts = [row.errors.friction if row.errors else None for row, _ in road.records()]
             each.append([part.method if part and slip else 0.0 for part, slip in zip(parts, slips, strict=True)])

@@ -13,10 +13,11 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band import Band, PressureLadder, Rung
 from parcontact.bands.choice import spectrum_of
-from parcontact.bands.road_sliding import RoadSliding
+from parcontact.bands.road_sliding import LEAST_METHOD, LEAST_OF_AREA, RoadSliding
 from parcontact.effects.branches import relaxation_of
 from parcontact.errors import JobError, RunError
 from parcontact.files import tables
+from parcontact.march.budget import ErrorParts, advice
 from parcontact.march.scene import set_up
 from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Array, Slab
@@ -368,3 +369,9 @@ def test_errors_of_the_area_by_the_grids_of_all_bands_add_up() -> None:
     grids = [result.errors[5] / result.contact_area_corrected for result in found._results]
     assert min(grids) > 0.001
     assert point.errors.area.mesh == pytest.approx(sum(grids), rel=1e-12)
+
+
+def test_advice_on_the_coupling_of_bands_states_what_fewer_bands_leave() -> None:
+    """The least errors of two or more bands: an accuracy below them takes a single band."""
+    text = advice(ErrorParts(0.01, 0.0, 0.0, 0.03, method=LEAST_OF_AREA), 0.1)
+    assert f"at least {LEAST_METHOD:.0%} in friction and {LEAST_OF_AREA:.0%} in a small area".replace("%", " %") in text
