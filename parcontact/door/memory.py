@@ -25,6 +25,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -273,15 +274,22 @@ def _work(nx: int, ny: int) -> float:
 @dataclass
 class StageCost:
     """Cost of a stage: its number of steps, how many of them were tried, and the sums of each cost over the `first` few
-    tried steps and over `later` tried steps."""
+    tried steps and over `later` tried steps.
+
+    `paces` are the times of an operator call [s] in the later steps. Their median gives the time of a step: on a loaded
+    machine single steps take many times as long as the others.
+    """
 
     steps: int
     tried: int = 0
     first: dict[str, float] = field(default_factory=dict)
     later: dict[str, float] = field(default_factory=dict)
+    paces: list[float] = field(default_factory=list)
 
     def add(self, cost: dict[str, float]) -> None:
         sums = self.first if self.tried < FIRST else self.later
+        if self.tried >= FIRST and cost.get("operator"):
+            self.paces.append(cost.get("seconds", 0.0) / cost["operator"])
         self.tried += 1
         for name, value in cost.items():
             sums[name] = sums.get(name, 0.0) + value
@@ -291,6 +299,8 @@ class StageCost:
         first, later = min(self.tried, FIRST), max(self.tried - FIRST, 0)
         sums = self.later if later else self.first
         each = sums.get(name, 0.0) / max(later or first, 1)
+        if name == "seconds" and self.paces:
+            each = median(self.paces) * sums["operator"] / later
         return self.first.get(name, 0.0) + (self.steps - first) * each
 
 

@@ -73,6 +73,16 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "process_time", partial(next, itertools.count(0.0, 2e-3)))
 
 
+def test_a_disturbed_step_does_not_lengthen_the_others() -> None:
+    """Steps of 2 calls and 1 s, and as many of 4 calls and 2 s; other programs made one of them take 100 s."""
+    stage = StageCost(100)
+    for number in range(22):
+        calls = 2 + 2 * (number % 2)
+        stage.add({"operator": calls, "seconds": 100.0 if number == 10 else calls / 2.0})
+    assert stage.total("operator") == pytest.approx(300.0)
+    assert stage.total("seconds") == pytest.approx(150.0)
+
+
 @pytest.mark.mpi(2)
 def test_waiting_for_other_ranks_is_no_work(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each wait takes 1000 s of processor time here, and the rest 2 ms whenever the clock is read."""
