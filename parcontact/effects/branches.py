@@ -48,8 +48,8 @@ MEMORYLESS_SHARE = 0.5  # tuning: share of the error for memoryless branches, wh
 
 
 def relaxation_of(material: Material) -> Prony:
-    """Return the relaxation function of a material [Pa, s]; its long-term modulus and no terms if it has no
-    branches."""
+    """Return the relaxation function of a material, with moduli in Pa and times in s. Without branches it has no terms,
+    only the long-term modulus."""
     body = material.fitted
     if isinstance(body, job.Elastic) or not body.branches:
         return Prony(body.long_modulus, np.zeros(0), np.zeros(0))
@@ -116,11 +116,12 @@ def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """The branches with a map (`kept`) and without (`memoryless`, `frozen`), by their numbers in the material.
+    """The branches of a material that have a map (`kept`), and those that have none (`memoryless`, `frozen`), by their
+    numbers in the material.
 
-    `bound` is the largest relative error of friction (of the modulus, if the body rests) that all branches without a
-    map cause, at most `allowed`. `memoryless_errors` are the errors of each branch if it were memoryless. `reason`
-    states why all branches need maps, or is ''.
+    All branches without a map together cause a relative error of at most `bound`, of friction if the surface slides,
+    else of the modulus; `bound` is at most `allowed`. `memoryless_errors` are the errors that each branch would cause
+    if it were memoryless. If all branches need maps, `reason` states why, else it is ''.
     """
 
     kept: tuple[int, ...]
@@ -182,14 +183,15 @@ def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
 
 
 def bounded_error(found: FoldedBranches, slides: bool) -> str:
-    """Return a text with the bound on the error that folded branches cause, at least LEAST_BOUND."""
+    """Return a text with the bound on the error that branches without a map cause; the text states at least
+    LEAST_BOUND."""
     what = "friction" if slides else "the modulus"
     return f"error of {what} at most {per_cent(max(found.bound, LEAST_BOUND))}"
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony, slides: bool) -> list[str]:
-    """Return sentences on the branches of a material [Pa, s] without a map; an empty list if all have maps and there is
-    no reason to mention. `slides` is True if the surface moves."""
+    """Return sentences on the branches of a material that have no map. The list is empty if all have maps and no reason
+    is to be stated. `prony` has relaxation times in s, and `slides` is True if the surface moves."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []

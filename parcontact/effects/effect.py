@@ -1,12 +1,12 @@
 """Interfaces that an effect and a contact law implement.
 
-An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to it. It makes
-a decision from the job alone, and states what is made, remembered and written if it is on. An effect may provide the
-contact law, and it is called after each step.
+An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to it. From the
+job alone it decides whether it is on, and states which columns, maps and memory it then adds. It is called after each
+step, and may provide the contact law.
 
-`ContactLaw` is the interface that a march uses: how a step is solved, its memory, and where surfaces touch in saved
-maps. Without an effect it is a constraint on pressures (`march.laws`). In the law of an effect the gap may be the
-unknown.
+`ContactLaw` is the interface to a contact law in a march: the solution of a step, the memory of the law, and where
+surfaces touch in saved maps. If no effect provides a law, the law only bounds the pressure (`march.laws`). In the law
+of an effect the gap may be the unknown.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ class ContactLaw(Protocol[Memory]):
         """Return the motion of the contact in a step, from its measures `before` the step and `now`, after it."""
 
     def gap(self, memory: Memory) -> Array | None:
-        """Return the map of the gap if the gap is the unknown, else None."""
+        """Return the map of the gap if the law solves for the gap, else None."""
 
     def detached(self, memory: Memory) -> Detached | None:
         """Return the time and the load at which the surfaces detached; None if they have not."""
@@ -381,7 +381,7 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
-        """Yield warnings about the contact of a step; `where` is the place of the step in words."""
+        """Yield warnings about the contact of a step; `where` names the step in words."""
         yield from ()
 
     @staticmethod
@@ -391,7 +391,7 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
-        """Return the detachment that ended the run, from the law's entries in a checkpoint; None if the run goes on."""
+        """Return the detachment that ended the run, which the law saved in a checkpoint; None if the run can go on."""
         return None
 
     def __init__(self, scene: Any) -> None: ...
@@ -413,7 +413,7 @@ class Effect(Protocol[Memory]):
         return Changes(memory)
 
     def values(self, memory: Memory) -> Sequence[float]:
-        """Return the values of the effect's columns for the last step, equal on all ranks; NaN: an empty cell.
+        """Return the values of the effect's columns for the last step, equal on all ranks. NaN becomes an empty cell.
         Local."""
         return ()
 
@@ -430,7 +430,8 @@ class Effect(Protocol[Memory]):
         return None
 
     def error_energy(self, memory: Memory) -> float | None:
-        """Return the error of the energies since the start [J]; None for the usual estimate under pressure."""
+        """Return the error of the energies since the start [J]; None if the usual estimate for energies under pressure
+        holds."""
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
@@ -439,8 +440,7 @@ class Effect(Protocol[Memory]):
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of a memory, by name; maps belong to the memory or are made for this
-        purpose."""
+        """Return the checkpoint entries of a memory, by name. Maps among them are maps of the memory, or new maps."""
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:

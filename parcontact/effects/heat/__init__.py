@@ -12,12 +12,13 @@ USES = ("shear",)  # see `capabilities`
 
 
 def _of(name: str) -> Callable[[Any], float]:
-    """Return the function of a point that gives one of its temperatures; NaN without `thermal`."""
+    """Return a function that takes a point and returns one of its temperatures, or NaN if the job has no `thermal`
+    section."""
     return lambda point: getattr(point.effects.get("thermal"), name, math.nan)
 
 
 def _error(point: Any) -> float:
-    """Return the relative error of the flash temperature of a point; NaN where it is 0."""
+    """Return the relative error of the flash temperature of a point; NaN if this temperature is 0."""
     flash = point.effects.get("thermal")
     return ERROR * point.error_friction if flash and flash.mean else math.nan
 

@@ -66,7 +66,8 @@ def uniform(body: Conductor, m: Array, time: float) -> Array:
 
 @dataclass(frozen=True)
 class Warming:
-    """The factors of S_j(m) for each wave of a band's half spectrum, shape (m, waves), with their multiplicity."""
+    """The factors of S_j(m) for all waves of band j, each multiplied by the number of waves that it stands for in a
+    half spectrum; shape (m, waves)."""
 
     symbols: Array
 
@@ -138,8 +139,8 @@ def flash_of_bands(
 
 
 def seconds_of(job: Job, cut: Cut, velocity: Vector) -> float:
-    """Return the time [s] in which the rubber slides the distance of the section `thermal`, or the length of the
-    coarsest band's box."""
+    """Return the time [s] in which the rubber slides over `thermal.distance`, or, without this key, over the length of
+    the coarsest band's box."""
     return float((job.section("thermal").distance or cut.box) / (math.hypot(*velocity) or math.inf))
 
 

@@ -92,8 +92,8 @@ class Thermal(Part):
         return Conductor(self.conductivity, self.diffusivity)
 
     def sliding_time(self, grid: Grid, speed: float) -> float:
-        """Return the time [s] for which steady sliding has warmed the rubber: along `distance`, by default once through
-        a periodic box; infinite in a free box without a distance."""
+        """Return the time [s] for which sliding at a `speed` [m/s] has warmed the rubber. The rubber has slid over
+        `distance`. Without this key it has slid once through a periodic box, and for an infinite time in a free box."""
         free = grid.boundary == "free"
         return (self.distance or (math.inf if free else max(grid.size))) / speed
 
@@ -137,14 +137,14 @@ class ThermalMemory:
 
 
 def _rubs(job: Any) -> bool:
-    """Return whether the contact area itself makes heat, by the shear of any effect."""
+    """Return True if any effect shears the contact area, so that heat is released on the surface."""
     effects = effects_of(type(job).model_fields).values()
     shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
     return any(shears) or job.sheared_first
 
 
 def _pulls(job: Any) -> bool:
-    """Return whether an effect lets surfaces pull each other."""
+    """Return True if an effect lets surfaces pull each other."""
     return any(limits.loads_press in lifted for lifted in job.asked("lifts"))
 
 
@@ -198,7 +198,8 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the map of temperatures, and of the maps that hold its spectra in a checkpoint."""
+        """Return the types of the maps in a checkpoint: the map of temperatures, and the maps into which spectra are
+        packed."""
         count = 2 + exponentials_of(job).kept
         return [np.float64] * (count + _rubs(job) + math.ceil(count / fft.per_map(job.grid.nx)))
 
@@ -214,7 +215,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return ThermalMemory(heat, self._slab.zeros())
 
     def follow(self, instant: Instant, memory: ThermalMemory) -> Changes[ThermalMemory]:
-        """Return the temperatures after a step; the waves of heat and the map of temperatures are advanced in place."""
+        """Return the changes of a step, with the temperatures after it. The waves of heat and the map of temperatures
+        are changed in place."""
         step, pressure = instant.step, instant.pressure
         if self._pulled:
             pressure = np.maximum(pressure, 0.0)
@@ -287,8 +289,8 @@ class ThermalColumns(Effect[ThermalMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries: the map of temperatures, all spectra as maps, and the columns of spectra that
-        do not fit into these; collective."""
+        """Return the checkpoint entries; collective. Each spectrum is saved as a map. A map cannot hold all columns of
+        a spectrum: further maps hold the other columns."""
         known, depths = memory.heat.sum, memory.depths
         found = {
             "rise": Entry(memory.rise, 1.0, "K"),

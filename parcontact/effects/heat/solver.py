@@ -453,8 +453,8 @@ def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: A
 
 
 def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
-    """Return the temperatures of a contact; collective. `surface` is the map of the surface's rise [K]; `pairs` are
-    maps of a rise [K] and of the heat released there."""
+    """Return the temperatures of a contact; collective. `surface` is the map of the temperature rise of the surface
+    [K]. Each of the `pairs` is a map of a rise [K] and a map of the heat that is released where this rise is."""
     sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
     warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
     highest = float(surface.max(initial=-math.inf))

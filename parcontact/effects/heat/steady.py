@@ -121,7 +121,7 @@ class Feedback:
 
 
 class HeatLoop:
-    """Loop that finds the temperatures of steady states on one grid; with feedback all rubber is at the flash
+    """Loop that finds the temperatures of steady states on one grid. With feedback all rubber relaxes at the flash
     temperature."""
 
     def __init__(self, setup: Setup) -> None:
@@ -148,7 +148,7 @@ class HeatLoop:
         return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, self._highest - cold)
 
     def _heat(self, sliding: Any, point: Point) -> Point:
-        """Return the last state with its temperatures, whose map is kept; collective."""
+        """Return the last state with its temperatures added, and keep the map of temperatures; collective."""
         p, by_energy = sliding.contact.p, point.friction - point.measures.friction_interface
         contact = p, Box().touches(p), point.measures, by_energy, point.velocity
         flash, self.fields["temperature"] = find_temperatures(sliding.setup, self._section, *contact)
@@ -156,7 +156,7 @@ class HeatLoop:
 
 
 def loops(setup: Setup) -> Iterator[HeatLoop]:
-    """Yield the loop over temperatures around steady states if the job has heat."""
+    """Yield the loop that finds the temperatures of steady states, if the job has a `thermal` section."""
     if setup.job.section("thermal") is not None:
         yield HeatLoop(setup)
 

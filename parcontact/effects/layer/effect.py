@@ -30,14 +30,16 @@ NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a bod
 
 
 class Body(Part):
-    """A layer, bonded to a rigid base or sliding on it without friction; without this section a half space."""
+    """The section `body`: the body is a layer, which is bonded to a rigid base or slides on it without friction.
+    Without this section it is a half space."""
 
     thickness: Positive = Field(description="a positive thickness [m]")
     base: Base = "bonded"
 
 
 def _is_thick_enough(body: Any, grid: Any) -> Iterator[Fault]:
-    """Yield an error if a layer in a free box is thinner than two cells, or if the compliance of a layer underflows."""
+    """Yield an error if a layer in a free box is thinner than two cells, or if a layer is too thin for its compliance
+    to be a number above 0."""
     least, of_box = 2 * max(grid.dx, grid.dy), THINNEST * max(grid.size)
     if body is not None and grid.boundary == "free" and body.thickness < least:
         sentence = f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free"
@@ -150,8 +152,8 @@ def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, 
 
 
 def _least_height(surface: tuple[Any, ...]) -> float:
-    """Return a lower bound of the height [m] of waves and roughness, twice the rms height; slopes count for the
-    shortest waves."""
+    """Return a lower bound of the height [m] of a surface: twice the rms height of its waves and roughness. If only the
+    slope of a roughness is given, its shortest waves give a lower bound of its rms height."""
     square = 0.0
     for shape in surface:
         if isinstance(shape, Wave):

@@ -90,7 +90,8 @@ class Layer(Response):
     base: Base = "bonded"
 
     def compliance_ratio(self, q: Array) -> Array:
-        """Return the compliance ratio S(q d) of the module for wavenumbers q > 0; 0 for q = 0."""
+        """Return S(q d), the displacement of the layer divided by that of a half space, for wavenumbers q > 0; 0 for q
+        = 0."""
         x = np.asarray(q * self.thickness, dtype=float)
         y, decay = 2.0 * x, np.exp(-2.0 * x)  # both are multiplied by 2 exp(-y) against overflow
         sinh, cosh = -np.expm1(-2.0 * y), 1.0 + decay**2
@@ -112,10 +113,11 @@ class Layer(Response):
 
     @cached_property
     def softest_wave(self) -> tuple[float, float]:
-        """Wavenumber of the wave for which the layer is softest, and this wave's pressure divided by displacement.
+        """Wavenumber of the wave for which the layer is softest, and the ratio of pressure to displacement for this
+        wave.
 
-        A compressible layer is softest for the longest waves; an incompressible bonded layer for waves about four times
-        as long as the thickness, as longer waves must push the layer along its base.
+        A compressible layer is softest for the longest waves. An incompressible bonded layer is softest for waves about
+        four times as long as the thickness, as longer waves must push the rubber along its base.
         """
         q = np.geomspace(*SOFTEST_BETWEEN, SOFTEST_TRIED) / self.thickness
         stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
@@ -133,8 +135,8 @@ class Layer(Response):
         return np.where(q < softest, stiffness, super().stiffness(q) / self.compliance_ratio(q))
 
     def reach(self, size: Vector) -> float:
-        """Return the distance over which the pressure at a point matters to a preconditioner: the thickness, or half of
-        it if the layer is nearly rigid to long waves."""
+        """Return the distance beyond which points in a box hardly interact: the thickness, or half of it if the layer
+        is nearly rigid to long waves."""
         return self.thickness * (1.0 if self.long_waves(size) is None else 0.5)
 
     def preconditioner(self, size: Vector) -> Callable[..., Any] | None:
@@ -158,11 +160,11 @@ class Layer(Response):
         return LongWaves(c0, c2, self.thickness, size)
 
     def coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
-        """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.
+        """Return the displacements at distances (x, y) from a cell of `dx x dy` under unit pressure.
 
-        The difference to a half space is smooth on the scale of the thickness: `(1 - nu)/(2 pi) int (S(q d) - 1)
-        J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond FAR the
-        difference is taken as 0.
+        At the distance r from a unit force, the displacement differs from that of a half space by `(1 - nu)/(2 pi) int
+        (S(q d) - 1) J0(q r) dq`. This difference is smooth on the scale of the thickness, so that Simpson's rule
+        averages it over the cell. It is taken as 0 for distances beyond FAR times the thickness.
         """
         correction = self._correction()
         mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))
@@ -174,8 +176,7 @@ class Layer(Response):
         return np.where(far, 0.0, super().coefficient(x, y, dx, dy) + dx * dy * mean)
 
     def _correction(self) -> Callable[[Array], Array]:
-        """Return the difference to the displacement of a half space under a unit force, as a function of
-        the distance."""
+        """Return a function of the distance r: the displacement under a unit force, minus that of a half space."""
         from scipy.interpolate import make_interp_spline  # slow to import, and for isolated layers only
         from scipy.special import j0
 
@@ -237,7 +238,8 @@ class LongWavePreconditioner:
             r += self._z[0]
 
     def _weigh(self, working: NDArray[Any]) -> None:
-        """Compute the diagonals on all grids from the number of points of each cell in the set."""
+        """Compute the diagonals of the equation for z on all grids, from the number of points in `working` in each
+        cell."""
         counts = [working, *self._diagonal[1:]]
         for k, cells in enumerate(self._levels):
             cells.add_up(*counts[k : k + 2])
@@ -247,7 +249,8 @@ class LongWavePreconditioner:
                 _find_diagonal(counts[level], *lines, self._inside, self._outside, faces, diagonal)
 
     def _cycle(self, level: int, r: Array) -> None:
-        """Solve for z on a grid with the right side stored there."""
+        """Approximate z on a grid by a V-cycle from this grid to larger cells and back. The right side is stored for
+        each grid."""
         given, z, left, diagonal = (maps[level] for maps in (self._given, self._z, self._left, self._diagonal))
         if level == len(self._levels):  # a single cell, its own neighbour
             z[...] = given / (diagonal - 2.0 * sum(self._faces))
@@ -273,11 +276,11 @@ class LongWavePreconditioner:
         _rest(z, neighbours, self._given[level], self._diagonal[level], *self._faces, self._left[level])
 
     def _add_up(self, level: int, points: NDArray[Any]) -> None:
-        """Put the sums over the cells of the next grid into its right side."""
+        """Add up points over the cells of the next grid, and store the sums as the right side of the next grid."""
         self._levels[level].add_up(points, self._given[level + 1])
 
     def _add_up_back(self, level: int, points: NDArray[Any]) -> None:
-        """Add z of the next grid to points."""
+        """Add z of each cell of the next grid to its points."""
         self._levels[level].add_up_back(self._z[level + 1], points)
 
 
@@ -289,7 +292,8 @@ def _first_grid(nx: int, ny: int, waves: LongWaves) -> int:
 
 @loop
 def _find_diagonal(count, rows, columns, inside, outside, faces, out):
-    """Put `faces + inside points + outside (points - count)` into `out`, with the points of each cell."""
+    """Put `faces + inside count + outside (points - count)` into `out`, for cells with so many points, of which `count`
+    are in contact."""
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             points = rows[j] * columns[i]

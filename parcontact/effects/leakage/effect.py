@@ -67,7 +67,7 @@ class LeakageColumns(Effect[tuple[float, ...]]):
         return end_in(job, saved) if job.section("leakage").total else None
 
     def __new__(cls, scene: Any) -> Any:
-        """Return the effect of a job: with `load: total` that of a fluid that carries a part of the load."""
+        """Return the effect of a job: `Seal` with `load: total`, and otherwise `LeakageColumns`."""
         return super().__new__(Seal if scene.job.section("leakage").total else cls)
 
     def __init__(self, scene: Any) -> None:

@@ -114,13 +114,15 @@ class Balance:
         return pressure
 
     def power(self, pressure: Map) -> float:
-        """Return the dissipation of the flow, sum c (p - p_neighbour)^2, with the pressures 1 and 0 at the ends."""
+        """Return the dissipation of the flow, `sum c (p - p_neighbour)^2`, for a map of pressures that are 1 at the
+        first and 0 at the last end."""
         return float(_dissipate(*self._map, self.first, self.last, pressure))
 
 
 def _number_black_cells(resistances: Map) -> NDArray[np.int32]:
-    """Return the numbers of black wet cells, WHITE and DRY elsewhere. If the number of columns is odd, two white cells
-    would touch across periodic sides: the last column then has none."""
+    """Return the numbers of black wet cells, WHITE for white wet cells and DRY for dry ones. If the number of columns
+    is odd, the last column has no white cells, since they would touch white cells of the first column across periodic
+    sides."""
     ny, nx = resistances.shape
     white = np.add.outer(np.arange(ny), np.arange(nx)) % 2 == 0
     white[:, -1] &= nx % 2 == 0
@@ -204,8 +206,8 @@ def _add(other, value, begin, end, columns, values):
 
 @loop
 def _gather(resistances, aspect, periodic, number, total, field, black, out):
-    """Add the flow from white neighbours of a field to black cells, or `c` times that of black neighbours to white
-    cells."""
+    """Add flows from neighbours to `out`: for black cells the share of the values `field` of white neighbours that
+    elimination leaves, for white cells `c` times the values of black neighbours."""
     for row in range(resistances.shape[0]):
         for column in range(resistances.shape[1]):
             own = number[row, column]
@@ -264,8 +266,12 @@ def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tup
 
 @loop
 def _open_until_connected(order, ny, nx, periodic):
-    """Open cells in an order until a path leads from the first row to the last. Return the last one, or -1. Open cells
-    that touch form a tree, `parent` leads to its root; both ends are additional cells."""
+    """Open cells in an order until a path leads from the first row to the last one, and return the cell opened last, or
+    -1 if there is no path.
+
+    Open cells that are connected form a tree, in which `parent` leads from each cell to the root. Both ends of the map
+    are further cells.
+    """
     first, last = nx * ny, nx * ny + 1
     parent = np.full(nx * ny + 2, -1, np.int64)
     parent[first], parent[last] = first, last
@@ -325,7 +331,8 @@ class Flow:
 
 
 def solve_flow(gap: FloatMap, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
-    """Return the flow along `axis` through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
+    """Return the flow along `axis` through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]. The
+    sides along the flow are periodic if `periodic_sides`, else closed."""
     if axis == "x":
         turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
         place = None if turned.position is None else (turned.position[1], turned.position[0])
@@ -344,7 +351,7 @@ def solve_flow(gap: FloatMap, size: tuple[float, float], axis: str = "x", period
 
 
 def _resistances(gap: FloatMap, constriction: float, periodic_sides: bool) -> FloatMap:
-    """Return 1/g^3 over 1/g^3 of the constriction; infinite in cells that are not used."""
+    """Return 1/g^3 of each cell, divided by that of the constriction; infinite in cells that are not used."""
     least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
     wet = connected_from_end_to_end(gap >= least, periodic_sides)
     found = np.full(gap.shape, np.inf)
@@ -404,8 +411,9 @@ class Leak:
 def leak(gap: ArrayLike, size: Sequence[float], periodic: bool | tuple[bool, bool] = True) -> Leak:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
 
-    Points with a gap of 0 or less are in contact. Sides along the flow are `periodic`, or closed. Raises InputError for
-    other shapes or sizes, and for gaps that are not finite.
+    Points with a gap of 0 or less are in contact. `periodic` is True if the box is periodic along x and y, or a pair of
+    such values for x and y. The sides along a flow are closed if the box is not periodic across it. Raises InputError
+    for other shapes or sizes, and for gaps that are not finite.
     """
     try:
         given = np.asanyarray(gap)

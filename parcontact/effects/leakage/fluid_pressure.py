@@ -135,7 +135,8 @@ class Rounds:
         self._parts, self._last = np.ones(()), None
 
     def _rest(self, share: Map, found: Map) -> float:
-        """Return the sum of all further changes over the next one, by those of the last two rounds (A. C. Aitken)."""
+        """Return the sum of all changes still to come, divided by the next one, as the changes of the last two rounds
+        predict it (A. C. Aitken)."""
         residual, last = found - share, self._last
         self._last = share, residual
         if last is None:
@@ -145,7 +146,8 @@ class Rounds:
         return min(max(1.0, -float(np.vdot(share - last[0], change)) / square), MOST_REST) if square else 1.0
 
     def _damped(self, share: Map, found: Map, rest: float) -> Map:
-        """Return the share of the next round, in which each cell makes a part of its change."""
+        """Return the map of s for the next round, in which each cell changes by a part of the difference `found -
+        share`."""
         residual, last = found - share, self._residuals[-1]
         self._parts = np.where(last * residual < 0.0, SHORTER, LONGER) * self._parts
         self._parts = np.clip(self._parts, LEAST, 1.0)
@@ -153,7 +155,8 @@ class Rounds:
         return share + rest * self._parts * residual
 
     def _mixed(self, share: Map, found: Map) -> Map:
-        """Return the share of the next round from that of a round and the one `found` from its gap."""
+        """Return the map of s for the next round by Anderson's method, from the map `share` of this round and the map
+        `found` that its gap gives."""
         self._shares.append(share)
         self._residuals.append(found - share)
         del self._shares[: -DEPTH - 1], self._residuals[: -DEPTH - 1]

@@ -293,7 +293,7 @@ class Gaps:
         return SolvedLeak(Leak(*flows), (errors[0], errors[1]), slipping, (sections[0], sections[1])), shown
 
     def _sides(self, axis: str) -> bool:
-        """Return whether the sides along a flow are periodic."""
+        """Return True if the sides along a flow in the direction `axis` are periodic."""
         return self.periodic["yx".index(axis)]
 
     def _conductivities(self, gap: FloatMap, flow: Flow, axis: str) -> tuple[float, ...]:
@@ -363,7 +363,8 @@ class Gaps:
         )
 
     def _flows(self, conductivity: float, axis: int) -> tuple[float, float]:
-        """Return the flows [m^3/s] and [kg/s] through a conductivity [m^3] along x (0) or y (1)."""
+        """Return the volume flow [m^3/s] and the mass flow [kg/s] through a conductivity [m^3] along x (`axis` 0) or y
+        (1)."""
         assert self.drop is not None
         through = conductivity, *self.size[:: -1 if axis else 1]
         return self.drop.flow_rate(*through), self.drop.mass_flow(*through)
@@ -474,7 +475,7 @@ def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
 
 
 def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
-    """Yield sentences on the flow of the fluid at the last instant with a flow, and where it is not a continuum."""
+    """Yield sentences on the flow of the fluid in the row `last`, and on gaps that are too narrow for a continuum."""
     drop = gaps.drop
     assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"

@@ -148,7 +148,7 @@ def panel_of(rows: Sequence[Any], over: str) -> Panel:
 
 
 def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> Panel:
-    """Return the panel of the flow through a gap over its largest value, with a ring at the constriction."""
+    """Return the panel of the flow through a gap, divided by its largest value, with a ring around the constriction."""
     ring, least, shown = list[Line](), 2.0, np.full_like(gap, np.nan)  # without a path no bar of colours
     if flow.position is not None:
         ring.append(Line("", *_place(flow.position, size, gap.shape), RING))
@@ -167,7 +167,8 @@ def _place(cell: tuple[int, int], size: tuple[float, float], shape: tuple[int, .
 
 
 def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:
-    """Return the map of |g^3 grad p| in open cells, divided by its maximum, NaN elsewhere; in single precision."""
+    """Return the map of |g^3 grad p| in open cells, divided by its maximum, in single precision; NaN where no fluid
+    flows."""
     slopes = []
     for axis, length in ((0, size[1]), (1, size[0])):
         faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # no flow into walls

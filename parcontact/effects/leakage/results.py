@@ -37,7 +37,7 @@ def headline(run: Results) -> Iterator[str]:
 
 
 def _with_part(columns: Columns) -> Iterator[str]:
-    """Yield the last known flow of a fluid that carries its part of the load."""
+    """Yield the last known flow of a fluid that carries a part of the load."""
     pairs = zip(columns.get("flow_rate_total", ()), columns.get("flow_rate", ()), strict=False)
     known = [(total, net) for total, net in pairs if total == total]
     if known:
@@ -118,10 +118,10 @@ PARTS = {TABLE: _describe_table}  # descriptions of files of a run, by their nam
 
 
 def describe_leak_stop(run: Results) -> list[str]:
-    """Return a sentence on leakage for each direction with known conductivity; one sentence if both agree.
+    """Return a sentence on leakage for each direction with known conductivity; one sentence if both directions agree.
 
-    A sentence states the pressure at the last instant with a flow and at the first instant without, or both times if
-    the pressure is constant. Raises InputError for an unreadable table.
+    A sentence states the pressures at the last instant with a flow and at the first instant without one, or their times
+    if the pressure is constant. Raises InputError for an unreadable table.
     """
     columns = run.read(TABLE) or run.table
     found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
@@ -148,7 +148,7 @@ def describe_axis(columns: Columns, axis: str) -> str:
 
 
 def _between(columns: Columns, before: int, after: int) -> str:
-    """Return the pressures of two rows as text; their times if the pressure is constant."""
+    """Return a text with the pressures of two rows, or with their times if the pressure is constant."""
     ends = columns["pressure"][before], columns["pressure"][after]
     if ends[0] != ends[1]:
         return f"between {span(min(ends), max(ends), 'Pa')}"

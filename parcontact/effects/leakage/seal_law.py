@@ -68,7 +68,8 @@ class SealMemory:
 
 
 class _Verdict(NamedTuple):
-    """Verdict on the last round: the rounds have settled, or the seal lifts off; the flow changed by `change`."""
+    """Verdict on the last round: True in `settled` if the rounds have settled, True in `lifted` if the seal lifts off,
+    and in `change` the estimated relative error of the flow."""
 
     settled: bool
     lifted: bool
@@ -138,8 +139,9 @@ class SealLaw:
         return replace(solved, contact=contact, memory=now, touching=gap == 0.0, numbers=numbers, end=end)
 
     def _begin(self, memory: SealMemory, past: PreviousContacts, step: Step) -> None:
-        """Put the pressure of the last contact, in the units of the solver, into the map of starts, and its share into
-        the spare one, moved with the surface by whole cells; collective."""
+        """Prepare the first round of a step from the last contact; collective. Its pressure, in the units of the
+        solver, goes into the map of starts, and its share into the spare map of the share. Both are moved with the
+        surface by whole cells."""
         (share, _), last, start = memory.spare, past.last, self._start
         if not memory.flows:
             share[...] = linear_share(self.slab.shape)
@@ -159,7 +161,8 @@ class SealLaw:
                 map_[...] = regrid.roll_rows(self.slab, map_, cells, self._image)
 
     def _press(self, trial: Trial, drop: PressureDrop, share: Array, control: Control) -> Control:
-        """Put the fluid's pressure and the heights of the contact under it into maps; return its load; collective."""
+        """Compute the fluid's pressure and the heights `h - A p~` of the contact below it, in maps of this object.
+        Return the load of the contact; collective."""
         np.divide(pressure_of(drop, share), trial.alpha * self.scene.units.pressure, out=self._fluid)
         self.scene.operators.operator.apply(self._fluid, self._image)
         np.subtract(trial.effective, self._image, out=self._heights)
@@ -169,7 +172,7 @@ class SealLaw:
         return MeanPressure(max(control.value - mean, LEAST_LOAD * control.value))
 
     def _most(self, trial: Trial, control: Control) -> float:
-        """Return the largest mean pressure of the fluid [Pa]."""
+        """Return the largest mean pressure of the fluid [Pa] at which contact still carries a load."""
         if not isinstance(control, MeanPressure):
             return math.inf
         return (1.0 - LEAST_LOAD) * control.value * trial.alpha * self.scene.units.pressure

@@ -43,13 +43,14 @@ Pressures = Annotated[Pair, PlainValidator(_pair, json_schema_input_type=tuple[N
 
 @dataclass(frozen=True)
 class FluidRamp(Ramp):
-    """Pressures of the fluid [Pa], high and low, that change linearly from `start` to `end` within a stage."""
+    """High and low pressure of the fluid [Pa], which change linearly from `start` to `end` within a stage."""
 
     start: Pair  # type: ignore[assignment]
     end: Pair  # type: ignore[assignment]
 
     def at(self, fraction: float, seconds: float) -> Pair:  # type: ignore[override]
-        """Return the pressures at a fraction of the stage; exact at both ends, and constant after the stage."""
+        """Return the high and the low pressure [Pa] at a fraction of the stage. They are exact at both ends, and
+        constant after the stage."""
         fraction = min(fraction, 1.0)
         high, low = ((1 - fraction) * first + fraction * last for first, last in zip(self.start, self.end, strict=True))
         return high, low
@@ -123,7 +124,7 @@ class Leakage(Part):
         return FLUIDS[name] if isinstance(name, str) else Fluid("the fluid", name)
 
     def drop(self, pressures: Pair) -> PressureDrop:
-        """Return the pressure drop of the fluid between two pressures [Pa]."""
+        """Return the pressure drop of the fluid from a high to a low pressure [Pa]."""
         assert self.pressures is not None
         ambient = self.pressures[1] if self.ambient is None else self.ambient
         return PressureDrop(self.substance, *pressures, True, ambient)
@@ -139,7 +140,7 @@ def drop_at(job: Any, stage: int, time: float) -> PressureDrop:
 
 
 def _before(section: Leakage, history: Any, stage: int) -> Pair:
-    """Return the pressures [Pa] with which a stage begins if it gives none."""
+    """Return the high and the low pressure [Pa] with which a stage begins if the stage gives none."""
     given = (each.fluid_pressures for each in reversed(history[:stage]))
     assert section.pressures is not None
     return next((ramp.end for ramp in given if ramp is not None), section.pressures)
@@ -151,7 +152,7 @@ def _needs_steps(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
 
 
 def _stages(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
-    """Check the pressures of the fluid in all stages, and their directions of sliding."""
+    """Yield errors of the fluid's pressures in all stages, and of the directions in which stages slide."""
     if leakage is None or any(stage is None for stage in history):
         return
     for number, stage in enumerate(history):

@@ -49,8 +49,8 @@ def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
 class StrainsOfBands:
     """The loop that finds the strains of bands.
 
-    A round replaces each strain by a power mean of the old and the new one. The first round of a state starts from the
-    strains of the last state.
+    The strain for the next round is a power mean of the old and the new strain of a band. The first round of a state
+    starts from the strains of the last state.
     """
 
     moves = True
@@ -74,8 +74,8 @@ class StrainsOfBands:
         self._strains = self._table.mixed(_strains_in(results), self._strains)
 
     def found(self, road: RoadSliding, point: Point, results: Results, changes: tuple[float, float]) -> Point:
-        """Return the point with its strain amplitude added: the root of the mean square strain of all bands, weighted
-        by friction; NaN without friction."""
+        """Return the point with its strain amplitude added. This is the root of the mean square strain of all bands,
+        weighted by their friction; NaN without friction."""
         weights = np.maximum([result.friction for result in results], 0.0)
         whole = math.sqrt(np.average(_strains_in(results) ** 2, weights=weights)) if weights.any() else math.nan
         return replace(point, errors=point.errors.with_rounds(*changes)).with_effect("softening", whole)

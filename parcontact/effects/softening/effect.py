@@ -41,7 +41,8 @@ def _of_a_file(path: Path | None, reference: float | None) -> Iterator[Fault]:
 
 
 class Softening(Part):
-    """Section with factors of the storage and the loss modulus as functions of the shear strain amplitude."""
+    """The section `softening`: factors of the storage and of the loss modulus as functions of the amplitude of shear
+    strain."""
 
     label: ClassVar[str] = "softening"
     table: tuple[Row, ...] | None = Field(
@@ -75,7 +76,7 @@ class Softening(Part):
 
     @property
     def fact(self) -> str:
-        """Return a sentence on the strain at which the factors are 1; '' if the job gives the factors."""
+        """A sentence on the strain at which the factors are 1; '' if the job gives the factors."""
         return self._made[1]
 
 
@@ -94,7 +95,7 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
 
 
 def in_a_periodic_box(softening: Softening | None, grid: Any) -> Iterator[Fault]:
-    """Yield an error for free boxes, for whose waves the strain is not known."""
+    """Yield an error for free boxes, since strains are known for waves in a periodic box only."""
     if softening is not None and not all(grid.cyclic):
         yield Fault(
             "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")

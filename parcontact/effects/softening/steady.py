@@ -102,8 +102,8 @@ def strains_of(
 
 
 def _continued(depths: Array, there: NDArray[np.int64], found: Array) -> Array:
-    """Return S at all depths: between those where it was `found` log S is a cubic spline in log z, above them S is in
-    proportion to z^2, and below them it is 0."""
+    """Return S at all depths. Within the range of depths where it was `found`, log S is a cubic spline in log z. Nearer
+    to the surface S is proportional to z^2, and deeper it is 0."""
     from scipy.interpolate import CubicSpline  # slow to import, and of use to few
 
     first, last = depths[there[0]], depths[there[-1]]
@@ -115,7 +115,8 @@ def _continued(depths: Array, there: NDArray[np.int64], found: Array) -> Array:
 def _weights(
     setup: Setup, power: Array, q: Array, depths: Array, octave: NDArray[np.int64], count: int
 ) -> tuple[Array, Array]:
-    """Return the weights of S(z) in the strain of each octave, averaged over the `power` of waves, and its power."""
+    """Return the weights of S(z) in the square of each octave's strain, averaged over its waves with their `power`, and
+    the power of each octave."""
     step = math.log(depths[1] / depths[0])  # of the trapezoidal rule in ln z
     sums = [np.bincount(octave.ravel(), power.ravel(), count)]
     for z in depths:
@@ -127,7 +128,7 @@ def _weights(
 
 
 def _power(setup: Setup, q: Array, velocity: Vector) -> Array:
-    """Return the dissipated power of each wave over the square of its amplitude, to a common factor."""
+    """Return the dissipated power of each wave, divided by the square of its amplitude, up to a common factor."""
     speed = setup.in_units(velocity)
     omega = np.abs(setup.half_space.frequencies(setup.fft, speed))
     modulus = setup.half_space.sliding_moduli(setup.fft, speed, setup.prony)(slice(None))
@@ -189,7 +190,8 @@ def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> flo
 
 
 def strains_at_octaves(setup: Setup, softened: Softened, u: Array, velocity: Vector) -> StrainsAtDepth:
-    """Return the strains of the octaves of softened rubber on one grid, like `strains_of`; collective."""
+    """Return the strains of all octaves of softened rubber on one grid; collective. `u` and `velocity` are as in
+    `strains_of`."""
     octave = softened.octave(np.hypot(*wavenumbers(setup.fft, setup.size)))
     return strains_of(setup, u, velocity, depths_between(*ends_of(setup)), octave, len(softened.strains))
 
@@ -200,7 +202,7 @@ MOST_ROUNDS = 40  # tuning: limit on rounds
 
 @dataclass(frozen=True)
 class Round:
-    """Result of one round: friction, and the strains of the octaves with their power."""
+    """Result of one round: the friction coefficient, and for each octave its strain [-] and its power."""
 
     friction: float
     strains: Array
@@ -238,8 +240,8 @@ class StrainLoop:
         self.softened = Softened(section.made, max(setup.size), (section.made.start,) * count_octaves(setup))
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
-        """Return the steady state with the moduli at its strains; collective. `solve` returns a state for the present
-        `setup` of `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
+        """Return the steady state whose moduli belong to its own strains; collective. `solve` returns a state for the
+        present `setup` of `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
         points, rounds = list[Point](), list[Round]()
 
         def once(softened: Softened) -> Round:
@@ -255,7 +257,7 @@ class StrainLoop:
 
 
 def loops(setup: Setup) -> Iterator[StrainLoop]:
-    """Yield the loop over strains around steady states if the job has softening."""
+    """Yield the loop that finds the strains of steady states, if the job has a `softening` section."""
     if setup.job.section("softening") is not None:
         yield StrainLoop(setup)
 

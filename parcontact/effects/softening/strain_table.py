@@ -1,8 +1,8 @@
-"""Factors of the moduli of filled rubber as functions of the shear strain amplitude, and files that contain them.
+"""Factors of the moduli of filled rubber as functions of the amplitude of shear strain, and files that contain them.
 
-The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`: f and g come
-from a sweep of the strain and depend on gamma alone. A file has these factors, or both moduli, at each strain
-amplitude.
+At each strain amplitude gamma the softened body is linear, with the modulus `G*(omega, gamma) = f(gamma) G'(omega) + i
+g(gamma) G''(omega)`. f and g come from a sweep of the strain and depend on gamma alone. A file has these factors, or
+both moduli, at each strain amplitude.
 """
 
 from collections.abc import Callable
@@ -23,8 +23,8 @@ MIXED = 0.7  # tuning: exponent of the new strain in that of the next round
 
 @dataclass(frozen=True)
 class StrainTable:
-    """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]. Between strains they are
-    linear in the logarithm of the strain; outside, they are constant."""
+    """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]. Between these strains
+    the factors are linear in the logarithm of the strain; outside they are constant."""
 
     start: ClassVar[float] = 0.02  # tuning: strain of the first round of a fixed point
 
@@ -33,7 +33,8 @@ class StrainTable:
     loss: tuple[float, ...]
 
     def factors(self, strain: Array | float) -> tuple[Array, Array]:
-        """Return the factors f of the storage modulus and g of the loss modulus at strains above 0, in their shape."""
+        """Return the factors f of the storage modulus and g of the loss modulus, in the shape of `strain`. Strains are
+        above 0."""
         place = np.log(strain)
         known = np.log(self.strain)
         return np.interp(place, known, self.storage), np.interp(place, known, self.loss)
@@ -57,9 +58,11 @@ class StrainTable:
 
 @dataclass(frozen=True)
 class Softened:
-    """Factors of the moduli for each wave, by the strain of the wave's octave.
+    """Factors of the moduli for each wave, which the strain of the wave's octave determines. `strains` has one item per
+    octave.
 
-    The first octave begins at the wavelength `longest` [any unit of length]; the last one contains all shorter waves.
+    The first octave begins at the wavelength `longest`, in any unit of length. The last octave contains all shorter
+    waves.
     """
 
     table: StrainTable
@@ -67,7 +70,7 @@ class Softened:
     strains: tuple[float, ...]
 
     def octave(self, q: Array) -> NDArray[np.int64]:
-        """Return the number of the octave of each wavenumber [1/length]."""
+        """Return the number of the octave of each wavenumber q, in 1 over the unit of `longest`."""
         return np.minimum(octave_of(q, self.longest), len(self.strains) - 1)
 
     def same_factors(self, other: "Softened") -> bool:
@@ -76,14 +79,15 @@ class Softened:
         return bool(np.array_equal(own, others))
 
     def factors(self, q: Array) -> tuple[Array, Array]:
-        """Return the factors of both moduli for waves with the wavenumbers q."""
+        """Return the factors of both moduli for waves with the wavenumbers q, each in the shape of q."""
         f, g = self.table.factors(np.array(self.strains))
         octave = self.octave(q)
         return f[octave], g[octave]
 
 
 def octave_of(q: Array, longest: float) -> NDArray[np.int64]:
-    """Return the number of the octave of each wavenumber [1/length], counted from the wavelength `longest`."""
+    """Return the number of the octave of each wavenumber q; octaves are counted from the wavelength `longest`. The unit
+    of q is 1 over that of `longest`."""
     ratio = np.maximum(q * longest / (2.0 * np.pi), 1.0)
     return np.floor(np.log2(ratio * (1.0 + ROUNDING))).astype(np.int64)
 
