@@ -29,8 +29,8 @@ from ..job.history import Step
 from ..job.listing import effects_of
 from ..job.parts import Part
 from ..parallel.slab import Array
-from ..physics.motion import Shear, Vector
 from ..physics.records import Entry, Measures, Memory, Saved, Units
+from ..physics.surface import Shear, Vector
 
 if TYPE_CHECKING:
     from ..contact.problem import Contact, Control

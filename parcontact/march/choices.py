@@ -17,8 +17,8 @@ from ..effects.branches import FoldedBranches, bounded_error, fold_branches, rel
 from ..effects.effect import EXTRAPOLATION, SINGLE, Decision, Effect, guarded
 from ..job import Grid, Job, Numerics, Output, Spectral, listing
 from ..job.history import Timeline, describe_steps
-from ..physics.motion import Shear
 from ..physics.prony import Prony
+from ..physics.surface import Shear
 
 Verdict = tuple[bool, str]  # True if an effect is on, and the reason
 

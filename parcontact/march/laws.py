@@ -37,8 +37,8 @@ from ..parallel import regrid
 from ..parallel.slab import Array
 from ..physics import loops
 from ..physics.body import Trial
-from ..physics.motion import are_whole, cells_between
 from ..physics.records import Entry, Measures, Saved, Units
+from ..physics.surface import are_whole, cells_between
 from ..printed import rounded_up
 from . import sanity
 from .scene import Scene, solver_on, solver_on_tiles

@@ -29,11 +29,10 @@ from ..physics.body import Body, ElasticBody, ZenerBody, states_errors
 from ..physics.convolution import SIDE, TileConvolution, TileOperator, Tiles
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, Probe, ZenerEnergy
 from ..physics.halfspace import HalfSpace
-from ..physics.motion import PARTS, AlongX, AnyFraction, Motion, Vector
 from ..physics.prony import Prony
 from ..physics.records import Units
 from ..physics.roughness import Moments, moments
-from ..physics.surface import Surface
+from ..physics.surface import PARTS, AlongX, AnyFraction, Motion, Surface, Vector
 from ..printed import quantity
 from .choices import Choices, choices
 from .controller import Controller, EmbeddedPair

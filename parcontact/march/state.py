@@ -22,8 +22,8 @@ from ..job.history import ChosenSteps, Step
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory, Trial, remembers, states_errors
 from ..physics.energy import EnergyMemory
-from ..physics.motion import friction_by_energy
 from ..physics.records import Entry, Measures, RunPart, Saved, Units, part_of, with_part
+from ..physics.surface import friction_by_energy
 from .budget import ENERGY, ErrorBudget, ErrorSums, estimate
 from .controller import IntegratorDifference, StepTolerance, TolerancePart
 from .laws import choose_contact_law

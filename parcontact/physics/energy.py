@@ -41,10 +41,9 @@ from ..parallel import regrid
 from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, MovedHeights, ZenerBody, surface_of
-from .motion import Shear, Vector
 from .prony import Prony, bend
 from .records import Entry, Measures, Saved, Units, excess_of
-from .surface import Surface
+from .surface import Shear, Surface, Vector
 
 SMALL = 1.0  # rounding: z below which integrals over a step are computed by Gauss's rule, to fifteen digits
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(10), (1, 0), strict=True))

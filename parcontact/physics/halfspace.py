@@ -317,7 +317,6 @@ def _love(x, y, dx, dy):  # type: ignore[no-untyped-def]
     return over_cell(x, y, dx, dy) / (4 * np.pi)
 
 
-Vector = tuple[float, float]
 LEAST_SYMBOL = 1e-6  # accuracy: least compliance of a wave in a table, over that of a half space
 UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as stiff as the square on average
 

@@ -137,7 +137,7 @@ def test_plan_tells_of_it(
 SHEAR = """
     @staticmethod
     def shear(job):
-        from parcontact.physics.motion import InterfaceFriction
+        from parcontact.physics.surface import InterfaceFriction
 
         return InterfaceFriction(2e4)
 

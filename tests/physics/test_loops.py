@@ -14,10 +14,9 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.loops import lowest, rows_of, shape_of
-from parcontact.physics.motion import friction_by_energy
 from parcontact.physics.records import Units
 from parcontact.physics.roughness import moments
-from parcontact.physics.surface import Surface
+from parcontact.physics.surface import Surface, friction_by_energy
 
 NY, NX = 5, 7
 BOUNDS = 0.0, np.inf

@@ -13,9 +13,8 @@ from parcontact.effects.interface.effect import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.energy import Probe
-from parcontact.physics.motion import InterfaceFriction
 from parcontact.physics.records import SIDE, Units
-from parcontact.physics.surface import Round, Surface, single_wave
+from parcontact.physics.surface import InterfaceFriction, Round, Surface, single_wave
 
 pytestmark = pytest.mark.mpi
 

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import MovedHeights
-from parcontact.physics.motion import PARTS, AlongX, AnyFraction
-from parcontact.physics.surface import Round, Surface, single_wave
+from parcontact.physics.surface import PARTS, AlongX, AnyFraction, Round, Surface, single_wave
 
 from .maps import coordinates, gathered, product, random_map
 from .surfaces import CENTRE, SHAPES, SIZE, WAVES, A, R, heights_of, surface_of

@@ -16,7 +16,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
 from parcontact.physics.energy import Probe
-from parcontact.physics.motion import AlongX, friction_by_energy
+from parcontact.physics.surface import AlongX, friction_by_energy
 
 
 def bare(planned: Job) -> Counter[str]:

@@ -30,8 +30,8 @@ from ...parallel import regrid
 from ...parallel.slab import Array, Slab
 from ...physics import loops
 from ...physics.body import Trial
-from ...physics.motion import cells_between
 from ...physics.records import SIDE, Certificate, Entry, Measures, Saved, Units
+from ...physics.surface import cells_between
 from ..effect import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, end_in, entries_of_end, nothing_holds
 from .gap_solver import (
     DUGDALE,

@@ -1,4 +1,4 @@
-"""The `interface` section of a job, friction of the contact area itself (`physics.motion`), and its effects."""
+"""The `interface` section of a job, friction of the contact area itself (`physics.surface`), and its effects."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ...job import limits
 from ...job.parts import Flag, Part, Positive, Rule, rules_of
 from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
-from ...physics.motion import InterfaceFriction
 from ...physics.records import Measures, Memory
+from ...physics.surface import InterfaceFriction
 from ..branches import time_factor_of
 from ..effect import Changes, Decision, Effect, Instant
 

@@ -25,8 +25,8 @@ from ...parallel import regrid
 from ...parallel.root import on_root
 from ...parallel.slab import Array
 from ...physics.body import Trial
-from ...physics.motion import cells_between
 from ...physics.records import Entry, Measures, Saved, Units
+from ...physics.surface import cells_between
 from ..effect import (
     ContactLaw,
     Detached,

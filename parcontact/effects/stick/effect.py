@@ -57,8 +57,8 @@ from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import BodyMemory, MovedHeights, surface_of
 from ...physics.energy import EnergyMemory, Pressed
-from ...physics.motion import Vector
 from ...physics.records import Entry, Measures, Saved, Units
+from ...physics.surface import Vector
 from ..effect import Changes, Instant, Sheared
 from ..interface.effect import InterfaceEffect, shares
 from . import solver

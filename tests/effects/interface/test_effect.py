@@ -12,8 +12,8 @@ from parcontact.job import Job, load
 from parcontact.march import scene
 from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.physics.motion import InterfaceFriction
 from parcontact.physics.records import Measures
+from parcontact.physics.surface import InterfaceFriction
 
 PRESSURE, STRESS, SPEED, LENGTH = 1e5, 2e5, 0.2, 1e-3
 CONSTANT = {"shear_stress": STRESS}
