@@ -391,11 +391,13 @@ class Probe:
         unit_pressure = alpha * units.pressure
         sides = sides_x + sides_y
         excess, least = self._excess * sides, 0.0
-        if self.hardness is not None and largest * unit_pressure >= (1.0 - YIELDED) * self.hardness:
+        if self.hardness is not None:
             highest = self.hardness / unit_pressure
-            yielding = self._measure_yielded(p, u, h, highest)
-            gaps -= yielding.gaps - yielding.points * d
-            excess, least = min(excess, yielding.excess), min(load / highest, count)
+            least = min(load / highest, count)
+            if largest >= (1.0 - YIELDED) * highest:
+                yielding = self._measure_yielded(p, u, h, highest)
+                gaps -= yielding.gaps - yielding.points * d
+                excess = min(excess, yielding.excess)
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
         if load > 0.0 or least_load > 0.0:
