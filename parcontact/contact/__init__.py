@@ -1,1 +1,1 @@
-"""Solvers for contact problems. They work on arrays and import no physics and no files."""
+"""Solvers for contact problems. They work on arrays, and read and write no files."""

@@ -19,20 +19,22 @@ LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where
 class Lines:
     """Grid lines along the sliding direction, for a body that is stiffer for waves along these lines.
 
-    `axis` is the axis of an array of rows that the lines follow. `contrast` c is the modulus of waves along the lines
-    over the modulus of other waves. A gap error that varies along the lines causes c times the pressure. The reference
-    length of the certificate is therefore reduced to the share s of its value for one modulus,
+    `axis` is the axis of maps, 0 or 1, along which the lines run. `contrast` c is the modulus of waves along the lines,
+    divided by the modulus of other waves. An error of the gap that varies along the lines causes c times the pressure
+    that other errors cause. The length of the certificate is therefore multiplied by the factor s,
 
         s^2 = v + (1 - v)/c^2.
 
-    Here v is the pressure-weighted variance of u after the mean of each line is subtracted, over the variance before.
+    Here v is the variance of u, weighted by the pressure, after the mean of each line is subtracted, divided by the
+    variance before.
     """
 
     axis: int
     contrast: float
 
     def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
-        """Return the factor s of the class for the pressure p, its displacement u and their sums; collective."""
+        """Return the factor s (see the class) for the pressure p and its displacement u; collective. `iterate` has the
+        sums over p and u."""
         loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
         if not self.axis:  # lines cross the rows of all ranks
             loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
@@ -45,8 +47,11 @@ class Lines:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Sums of p, p g, and `p (A p)^2` over all points at the approach d, `energy = <p, A p>/2`, and sums of p and p g
-    over free points.
+    """Sums over a pressure p and its gap g at the approach d.
+
+    Over all points `load` is the sum of p, `gaps` of p g, `squares` of p u^2, and `energy` is half of the sum of p u,
+    with u = A p. Over free points `free_load` is the sum of p less its lower bound, and `free_gaps` that of its
+    products with g.
 
     If no point is free, `between` holds the lowest and the highest approach at which no pressure changes. If there is
     no such approach, the first number exceeds the second.

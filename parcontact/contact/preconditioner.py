@@ -148,7 +148,7 @@ Map = NDArray[Any]
 
 @dataclass(frozen=True)
 class CellLevel:
-    """Sums over cells, interpolation between them, and the transposes of both, for one step of `pyramid`.
+    """Sums over cells, interpolation between them, and the transposes of both, for one step of `regrid.pyramid_steps`.
 
     Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All methods except
     `add_up` add their result to their last argument. Collective.
@@ -198,8 +198,8 @@ class CellLevel:
 
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
-    """Return the steps from a grid to a single cell, the finest first. The first `pairs` steps join pairs of cells, all
-    further steps two by two cells."""
+    """Return the levels from a grid to a single cell, the finest first. The first `pairs` levels join pairs of cells,
+    all further levels join two by two cells."""
     return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
 
 

@@ -173,10 +173,10 @@ PLAIN, PLAIN_AFTER_STALL = 3, 25  # tuning: steps without acceleration that foll
 class Splitting:
     """Solver of steady contact by accelerated splitting on one grid.
 
-    `operator` is A of a periodic box (the padded operator of a free box has waves with a negative real part), and
-    `inverse` K is near its inverse. `tolerance` limits the certificate, `most` the number of steps. Laws and pressures
-    are in the units of A. It holds two maps, a byte per point, the maps of `Acceleration` and, during a solve, a
-    symbol.
+    `operator` is A of a periodic box: waves of the padded operator of a free box may have a negative real part.
+    `inverse` is an operator K close to the inverse of A. `tolerance` limits the certificate, and `most` the number of
+    steps. Laws and pressures are in the units of A. The solver holds two maps, a byte for each point, the maps of
+    `Acceleration` and, during a solve, the symbol of `resolvent`.
     """
 
     def __init__(self, judge: Judge, operator: Convolution, inverse: Operator, tolerance: float, most: int) -> None:

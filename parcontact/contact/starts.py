@@ -340,7 +340,8 @@ class _Descent:
         return contact
 
     def count(self) -> None:
-        """Count the operator calls of all levels by their share of the points."""
+        """Put the operator calls of all levels into the count of the run. A call on a level counts as the number of its
+        points divided by the number of points of the finest grid."""
         self._tally["operator"] = self._before + round(self._cost)
 
     def _tiles_of(self, level: Level) -> Tiles | None:

@@ -46,7 +46,8 @@ from .records import Entry, Saved, Units
 
 @dataclass(frozen=True)
 class MovedHeights:
-    """Heights of the rigid surface: the map `base`, shifted by `offset` cells along x (cyclic)."""
+    """Heights of the rigid surface: the map `base`, shifted by `offset` cells along x. Cells beyond the edge of the box
+    come in again at the other edge."""
 
     base: Array
     offset: int = 0
@@ -62,10 +63,10 @@ class BodyMemory:
     last step, and the branch maps.
 
     `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over the
-    last step, which the next `begin` makes, with the increments in this step and in the step before (map `before`); the
-    effective heights then replace `before`. The memory keeps its meaning, so that another step may begin from it.
-    Memories before and after a step share all maps but the displacement: the memory before is invalid once a step has
-    begun from the memory after.
+    last step. The next `begin` makes this advance, with the increments in the last step and in the step before it (map
+    `before`), and puts the effective heights into the map `before`. Another step may still begin from the same memory.
+    The memories before and after a step share all maps but the displacement: once a step has begun from the memory
+    after, the memory before is invalid.
     """
 
     displacement: Array | None
@@ -77,7 +78,7 @@ class BodyMemory:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step of a body that has begun; the step may be dropped without any call.
+    """A step of a body that has begun. To drop the step, nothing need be called.
 
     Its contact problem has an elastic body of modulus `alpha` and the `effective` heights, a map that is valid until
     the next step begins. `advance` has the coefficients of the branches over the step.
@@ -112,8 +113,8 @@ class ElasticBody:
         """Do nothing: the displacement follows from the pressure."""
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step whose effective heights are the heights; local. The displacement of `memory` is dropped, as the
-        next solve overwrites its map."""
+        """Begin a step whose effective heights are the moved heights; local to this rank. The displacement of `memory`
+        is dropped, as the next solve overwrites its map."""
         memory.displacement = None
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights, NO_BRANCHES)
@@ -126,8 +127,8 @@ class ElasticBody:
         return replace(memory, displacement=displacement)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement under the pressure `alpha p`; collective. If it was dropped, it is computed from
-        `of_pressure()`, the displacement under p for the modulus 1."""
+        """Return the displacement under the pressure `alpha p`; collective. If the memory has dropped the displacement,
+        it is computed from `of_pressure()`, the displacement under p for the modulus 1."""
         if memory.displacement is None:
             memory.displacement = of_pressure()
             memory.displacement *= alpha / self.modulus  # 1 after a step of this body
@@ -153,10 +154,11 @@ class _Coefficients:
 
 
 class ZenerBody:
-    """A body with relaxing branches, given by their numbers in `prony`.
+    """A body whose relaxing branches are the terms of `prony`.
 
-    Branches of `kept` have one map each, in this order; `memoryless` and `frozen` branches have none. All but the
-    frozen branches are `moving`. `shortest_time` [s] is the shortest relaxation time of `kept`.
+    The lists `kept`, `moving`, `memoryless` and `frozen` have numbers of branches. Branches of `kept` have one map
+    each, in this order; `memoryless` and `frozen` branches have none. All branches that are not frozen are `moving`.
+    `shortest_time` [s] is the shortest relaxation time of the branches in `kept`.
     """
 
     def __init__(
@@ -188,7 +190,8 @@ class ZenerBody:
         return elapsed(self.prony, dt)
 
     def coefficients(self, dt: float, growth: float = 0.0) -> Advance:
-        """Return the coefficients of the branches for a step dt, `growth` times as long as the step before it."""
+        """Return the coefficients of all branches for a step of the length dt [s], which is `growth` times the length
+        of the step before."""
         return coefficients(self.prony, self.integrator, dt, growth)
 
     def at_rest(self) -> BodyMemory:
@@ -208,7 +211,7 @@ class ZenerBody:
         """Begin a step of modulus alpha with the effective heights `h + r/alpha`; local to this rank. It replaces any
         step that has begun from the same memory.
 
-        `growth` is dt over the length of the step before; 0 after a jump and in the first step of a stage.
+        `growth` is dt divided by the length of the step before; 0 after a jump and in the first step of a stage.
         """
         if self._coefficients is None or (self._coefficients.dt, self._coefficients.growth) != (dt, growth):
             self._coefficients = self._coefficients_of(dt, growth)
@@ -244,7 +247,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which must match."""
+        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which must be those of the
+        checkpoint from which a run continues."""
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),

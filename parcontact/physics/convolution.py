@@ -1,6 +1,6 @@
 """Convolutions on a grid, by a symbol on the wavenumbers of a transform or by coefficients in space, and on tiles.
 
-Operators on tiles, and from tiles to the whole grid, have a cost that follows the points of tiles, not of the box.
+Operators on tiles, and from tiles to the whole grid, cost in proportion to the points of the tiles, not of the box.
 
 The coefficients between two tiles depend on their offset only, and are split (P. P. Ewald, Ann. Phys. 369 (1921)
 253) with a length s and the distance r:
@@ -39,9 +39,9 @@ PARTS = 16  # tuning: parts of a spectrum that are computed one after the other,
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    `part(rows)` returns the symbol on these rows of the spectrum. The symbol is stored as `dtype`, times the scale of
-    the transforms, in `symbols` for each block of columns. If it is `even` in q_y, only rows of q_y >= 0 are made; with
-    `later` they are made at the first use.
+    `part(rows)` returns the symbol on these rows of the spectrum. `symbols` holds, for each block of columns, the
+    symbol multiplied by the scale of the transforms, in the type `dtype`. If the symbol is `even` in q_y, only rows of
+    q_y >= 0 are made. If `later` is True, the symbols are made at the first use of the operator.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Convolution:
         return self.fft.convolve(field, self.symbols, out)
 
     def mean(self) -> float:
-        """Return the image of a uniform field 1; collective."""
+        """Return the value of the uniform field to which the operator takes the uniform field 1; collective."""
         owns = self.fft.columns.start == 0 < self.fft.columns.stop
         own = float(self.symbols[0][0, 0].real) * self.fft.mx * self.fft.my if owns else 0.0
         return self.fft.slab.sum(own)[0]
@@ -152,8 +152,8 @@ def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple
 
 
 def travelling_wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Return `wavenumbers` with 0 for the Nyquist wavenumbers, which have two signs: the slope of such a wave is 0 on
-    the grid."""
+    """Return `wavenumbers` with 0 in place of Nyquist wavenumbers, whose sign is not defined: the slope of such a wave
+    is 0 on the grid."""
     qx, qy = wavenumbers(fft, size, rows)
     along_x, along_y = fft.modes
     return np.where(2 * np.abs(along_x) == fft.mx, 0.0, qx), np.where(2 * np.abs(along_y[rows]) == fft.my, 0.0, qy)
@@ -292,8 +292,8 @@ class TileConvolution:
         self._forward.execute()
 
     def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
-        """Yield the result for the transformed map on each of the tiles `columns` in a row of tiles, each valid until
-        the next one."""
+        """Yield the result for the transformed map on each of the tiles `columns` in a row of tiles. A result is valid
+        until the next one is yielded."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
             self._add_up(rows, columns[place : place + 1], own)

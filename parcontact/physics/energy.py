@@ -51,7 +51,8 @@ NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.lege
 
 @dataclass(frozen=True)
 class EnergyMemory:
-    """Memory of the energies of a body: sums since the start, in the unit of the scene; `dissipated` by branch.
+    """Memory of the energies of a body: sums since the start, in the scene's unit of energy. `dissipated` has a number
+    for each branch.
 
     A body with branches also needs the products `spring`: `<u, A^-1 u>`; `branches`: `<h_k, A^-1 h_k>`; and with the
     last increment of u, `increment`: `<du, A^-1 du>` and `crossed`: `<h_k, A^-1 du>`. `elastic` is the memory of
@@ -68,8 +69,8 @@ class EnergyMemory:
     elastic: BodyMemory | None = None
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
-        """Return the energies after a step without external work: the branches have dissipated the decrease of the
-        stored energy, each by its share in the dissipation since `before`."""
+        """Return the energies after a step in which no external work is done. The branches have dissipated what the
+        stored energy has lost, each in proportion to its dissipation since the memory `before`."""
         lost = self.dissipated - before.dissipated
         whole = float(lost.sum())
         share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
@@ -147,7 +148,7 @@ def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies of a body without memory, which stores all work; `unit` [J] is their unit."""
+    """Energies, in the unit `unit` [J], of a body without memory, which stores all work."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 

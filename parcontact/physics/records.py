@@ -2,8 +2,8 @@
 
 Only numpy is imported, so that this file is read quickly.
 
-Each part of a run defines its first memory, the entries of a memory, and the memory that entries give, for any number
-of ranks (`RunPart`); `march.state.parts_of` lists all parts.
+Each part of a run (`RunPart`) returns its memory before the first step, the checkpoint entries of a memory, and the
+memory that saved entries describe, on any number of ranks. `march.state.parts_of` lists all parts.
 
 In the units of a run all numbers are dimensionless. The units are powers of two: conversion is exact, and a checkpoint
 in SI units restarts bit for bit.
