@@ -174,6 +174,24 @@ def test_snaps_are_in_the_loss(steps: dict[str, Any]) -> None:
     assert abs(by_rows.loss - by_work.loss) <= by_rows.error_loss * by_rows.loss
 
 
+def test_work_on_a_body_that_creeps_is_no_loss() -> None:
+    """The force is `m + f sin wt`, the approach `a sin(wt - lag) + v t`. Of the work `pi f a sin lag` is lost, and the
+    rest, `m v T`, belongs to the mean force on the creeping body."""
+    job, mean, swing, lag, drift = Job.model_validate(ball(16, force(1.0))), MEAN, AMPLITUDE, 0.3, 2e-6
+    time = np.linspace(0.0, 1.0, 65)
+    angle, none = 2.0 * math.pi * time, np.full(65, 1e-3)
+    lost = math.pi * swing * 1e-5 * math.sin(lag)
+    columns = {
+        "time": time + 0.1,
+        "pressure": (mean + swing * np.sin(angle)) / (job.grid.lx * job.grid.ly),
+        "approach": 1e-5 * np.sin(angle - lag) + drift * time,
+        "work": (lost + mean * drift) * time,  # only its ends count
+        **dict.fromkeys(("force_x", "force_y", "error_friction", "error_area", "residual"), none),
+    }
+    (found,) = find_cycles(job, columns)  # type: ignore[arg-type]
+    assert found.loss == pytest.approx(lost, rel=1e-9)
+
+
 def test_restart_within_a_cycle(comm: MPI.Intracomm, tmp_path: Path) -> None:
     """A run that is cut within its second stage goes on bit for bit, with the same cycles.csv."""
     bench, whole = Bench(comm, tmp_path), tmp_path / "whole"
