@@ -8,9 +8,10 @@ Heat in Solids (1959), section 10.7)
     T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0.                               (1)
 
 Heat that is released at the depth z reaches the surface with the factor exp(-beta z). A wave of pressure of the
-wavenumber q strains an incompressible half space: the squares of all strains add up to a constant times `(q z)^2 exp(-2
-q z)`, which is the same under crests and troughs. So the heat that the wave dissipates has the distribution `4 q (q
-z)^2 exp(-2 q z) dz` over the depth, with the mean depth `3/(2 q)`. It reaches the surface with the factor
+wavenumber q strains an incompressible half space: the squares of all strains add up to a constant times
+`(q z)^2 exp(-2 q z)`, which is the same under crests and troughs. So the heat that the wave dissipates has the
+distribution `4 q (q z)^2 exp(-2 q z) dz` over the depth, with the mean depth `3/(2 q)`. It reaches the surface with the
+factor
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
@@ -32,9 +33,9 @@ rate m_j^2 and the weight w_j. The amplitude c of each wave j along the depth an
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e.                                       (4)
 
 Within a step q is linear in time, and (4) is solved exactly. For heat on the surface g_j = 1; for heat of the body g_j
-is the share (3) for m = m_j/sqrt(D). The temperature at the depths at which this heat is released is `sum_j w_j g_j
-c_j/e`. The mean of the box (k = 0) has a sum of exponentials of its own, which is exact to 1e-9 at any time, so that no
-heat is lost.
+is the share (3) for m = m_j/sqrt(D). The temperature at the depths at which this heat is released is
+`sum_j w_j g_j c_j/e`. The mean of the box (k = 0) has a sum of exponentials of its own, which is exact to 1e-9 at any
+time, so that no heat is lost.
 
 Free box. A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, causes at the
 distance (x, y) from the cell the rise (H. S. Carslaw, J. C. Jaeger, section 10.4)

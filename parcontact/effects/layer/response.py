@@ -5,8 +5,8 @@ wavenumber q by
 
     u^(q) = (1 - nu)/q S(q d) p^(q),
 
-where S is the ratio of this displacement to that of a half space. If the layer is bonded to the base, with kappa = 3 -
-4 nu,
+where S is the ratio of this displacement to that of a half space. If the layer is bonded to the base,
+with `kappa = 3 - 4 nu`,
 
     S(x) = (kappa sinh 2x - 2x) / (kappa cosh 2x + 2x^2 + 5 - 12 nu + 8 nu^2),
 
@@ -162,9 +162,9 @@ class Layer(Response):
     def coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
         """Return the displacements at distances (x, y) from a cell of `dx x dy` under unit pressure.
 
-        At the distance r from a unit force, the displacement differs from that of a half space by `(1 - nu)/(2 pi) int
-        (S(q d) - 1) J0(q r) dq`. This difference is smooth on the scale of the thickness, so that Simpson's rule
-        averages it over the cell. It is taken as 0 for distances beyond FAR times the thickness.
+        At the distance r from a unit force, the displacement differs from that of a half space by
+        `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`. This difference is smooth on the scale of the thickness, so that
+        Simpson's rule averages it over the cell. It is taken as 0 for distances beyond FAR times the thickness.
         """
         correction = self._correction()
         mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))
@@ -292,8 +292,8 @@ def _first_grid(nx: int, ny: int, waves: LongWaves) -> int:
 
 @loop
 def _find_diagonal(count, rows, columns, inside, outside, faces, out):
-    """Put `faces + inside count + outside (points - count)` into `out`, for cells with so many points, of which `count`
-    are in contact."""
+    """Put `faces + inside count + outside (points - count)` into `out`. For each cell, `points` is the number of its
+    points, and `count` the number of those in contact."""
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             points = rows[j] * columns[i]

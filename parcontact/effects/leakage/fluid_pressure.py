@@ -13,11 +13,11 @@ from 1 to 0:
     p^2 = p2^2 + s (p1^2 - p2^2)    for a gas.
 
 Each round solves the contact under the pressure of the fluid, and then the flow through its gap, which gives another
-map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map for the next round from the last `DEPTH
-+ 1` rounds. Near percolation, pools open and close again. Therefore each cell changes its s by a part of the difference
-only, after `ANDERSON` rounds, and this part is halved whenever the difference changes its sign. If the rounds have not
-settled after `EACH` of them, they go on with an eps that is `GROWTH` times as large, and begin again with Anderson's
-method.
+map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map for the next round from the last four
+rounds. Near percolation, pools open and close again. Therefore, after `ANDERSON` rounds, each cell changes its s by a
+part of the difference of both maps only, and this part is halved whenever the difference changes its sign. If the
+rounds have not settled after `EACH` of them, they go on with an eps that is `GROWTH` times as large, and begin again
+with Anderson's method.
 """
 
 import math
@@ -146,8 +146,8 @@ class Rounds:
         return min(max(1.0, -float(np.vdot(share - last[0], change)) / square), MOST_REST) if square else 1.0
 
     def _damped(self, share: Map, found: Map, rest: float) -> Map:
-        """Return the map of s for the next round, in which each cell changes by a part of the difference `found -
-        share`."""
+        """Return the map of s for the next round, in which each cell changes by a part of the difference
+        `found - share`."""
         residual, last = found - share, self._residuals[-1]
         self._parts = np.where(last * residual < 0.0, SHORTER, LONGER) * self._parts
         self._parts = np.clip(self._parts, LEAST, 1.0)

@@ -6,9 +6,9 @@ displacement. With the heights h of the rigid surface and its approach d, the ga
 
     g = A (q + p~) - h - d >= 0,    q >= 0,    q g = 0,    <q> = p0 - <p~>,
 
-where p0 is the load above ambient, and <> the mean over the box. Each round first solves the contact of the heights `h
-- A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through its gap, which gives the next p~.
-Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
+where p0 is the load above ambient, and <> the mean over the box. Each round first solves the contact of the heights
+`h - A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through its gap, which gives the next
+p~. Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
 """
 
 from __future__ import annotations

@@ -11,10 +11,10 @@ Then
 
     S(z) = <d gamma^2>/<d>/R(z)                                                                                   (2)
 
-is the mean square strain at the depth z, weighted by power. Waves with independent phases would also have `<d
-gamma^2>/(<d> <gamma^2>)` above 1; R is this ratio for waves with the amplitudes of the contact and independent phases.
-In full contact phases are independent, and S is the sum of gamma^2 over all waves. The strain of one wave is a mean
-over the depths at which it dissipates,
+is the mean square strain at the depth z, weighted by power. Waves with independent phases would also have
+`<d gamma^2>/(<d> <gamma^2>)` above 1; R is this ratio for waves with the amplitudes of the contact and independent
+phases. In full contact phases are independent, and S is the sum of gamma^2 over all waves. The strain of one wave is a
+mean over the depths at which it dissipates,
 
     gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
 
@@ -173,8 +173,8 @@ def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> flo
     """Return R of (2) for waves with independent phases, from their fourth moments.
 
     Let the components of the vector E be those of the strain, and of the vector W those of the strain times the root of
-    a wave's power, both weighted so that E^2 = gamma^2 and W^2 = d. Then R is `1 + (2 sum_ij <E_i W_j>^2 - sum_k
-    <E^2>_k <W^2>_k)/(<E^2> <W^2>)`, with a sum over the waves k.
+    a wave's power, both weighted so that E^2 = gamma^2 and W^2 = d. Then R is
+    `1 + (2 sum_ij <E_i W_j>^2 - sum_k <E^2>_k <W^2>_k)/(<E^2> <W^2>)`, with a sum over the waves k.
     """
     counts = setup.fft.multiplicity
     q = np.hypot(*wavenumbers(setup.fft, setup.size))

@@ -1,8 +1,8 @@
 """Factors of the moduli of filled rubber as functions of the amplitude of shear strain, and files that contain them.
 
-At each strain amplitude gamma the softened body is linear, with the modulus `G*(omega, gamma) = f(gamma) G'(omega) + i
-g(gamma) G''(omega)`. f and g come from a sweep of the strain and depend on gamma alone. A file has these factors, or
-both moduli, at each strain amplitude.
+At each strain amplitude gamma the softened body is linear, with the modulus
+`G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`. f and g come from a sweep of the strain and depend on
+gamma alone. A file has these factors, or both moduli, at each strain amplitude.
 """
 
 from collections.abc import Callable
