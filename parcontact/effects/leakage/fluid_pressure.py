@@ -13,11 +13,11 @@ from 1 to 0:
     p^2 = p2^2 + s (p1^2 - p2^2)    for a gas.
 
 Each round solves the contact under the pressure of the fluid, and then the flow through its gap, which gives another
-map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map for the next round from the last four
-rounds. Near percolation, pools open and close again. Therefore, after `ANDERSON` rounds, each cell changes its s by a
-part of the difference of both maps only, and this part is halved whenever the difference changes its sign. If the
-rounds have not settled after `EACH` of them, they go on with an eps that is `GROWTH` times as large, and begin again
-with Anderson's method.
+map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map for the next round from this round and
+the `DEPTH` rounds before it. Near percolation, pools open and close again. Therefore, after `ANDERSON` rounds, each
+cell changes its s by a part of the difference of both maps only, and this part is halved whenever the difference
+changes its sign. If the rounds have not settled after `EACH` of them, they go on with an eps that is `GROWTH` times as
+large, and begin again with Anderson's method.
 """
 
 import math
