@@ -197,8 +197,8 @@ class HeatOfBands:
             raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
 
     def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the bands have the rises that their heat causes, within an error. As long as other loops have
-        not settled for cold rubber, heat is ignored and the rises stay 0. Arguments are as in
+        """Return True if the bands have the rises that their heat causes, within an error. The rises stay 0 until all
+        loops before this one have settled for cold rubber. Arguments are as in
         `bands.road_sliding.BandLoop.settles`."""
         rubbed = road.rub(results) * road.speed
         self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises

@@ -100,7 +100,7 @@ class Thermal(Part):
 
 def exponentials_of(job: Any) -> Exponentials:
     """Return the sum of exponentials that describes the conduction of heat in the rubber of a job. It holds for times
-    from the shortest sliding step to the diffusion time of the longest wave in the box."""
+    from the shortest sliding step to DECAYED diffusion times of the longest wave in the box."""
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
