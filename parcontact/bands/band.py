@@ -40,7 +40,7 @@ from ..job.surfaces import GivenHeights
 from ..march.budget import ErrorBudget
 from ..march.choices import choices
 from ..march.scene import Setup, set_up
-from ..march.steady import branch_powers, judge_state, tolerance_of
+from ..march.steady import branch_powers, direction_of, judge_state, tolerance_of
 from ..march.time_error import properties_of
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
@@ -283,12 +283,6 @@ def _seed(job: Job, number: int, sample: int) -> int:
     if number == sample == 0:
         return int(seed)
     return int(np.random.SeedSequence([seed, number, sample]).generate_state(1, np.uint64)[0])
-
-
-def direction_of(velocity: Vector) -> Vector:
-    """Return the unit vector along a velocity."""
-    speed = math.hypot(*velocity)
-    return velocity[0] / speed, velocity[1] / speed
 
 
 # -- steps of a history -----------------------------------------------------------------------------------------------

@@ -88,7 +88,7 @@ class ContactStore:
             for line in file:
                 try:
                     digest, numbers = json.loads(line)
-                    self._known[digest] = _rung(numbers)
+                    self._known[digest] = Rung(**{**_arrays(numbers), "found": _arrays(numbers["found"])})
                 except (ValueError, TypeError, KeyError):
                     break
                 whole += len(line)
@@ -112,10 +112,6 @@ def _plain(rung: Rung) -> dict[str, Any]:
 
 def _lists(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.asarray(value).tolist() for name, value in values.items()}
-
-
-def _rung(numbers: dict[str, Any]) -> Rung:
-    return Rung(**{**_arrays(numbers), "found": _arrays(numbers["found"])})
 
 
 def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -169,7 +169,9 @@ class RoadHistory(RoadSliding):
     def __init__(self, job: Job, slab: Slab) -> None:
         super().__init__(job, slab)
         self.pressure = job.history[0].load.end
-        fastest = max((abs(speed) for speed in self._speeds()), default=0.0)
+        initial = [job.initial.velocity[0]] if job.initial.state == "steady" else []
+        speeds = [*initial, *(stage.velocity[0] for stage in job.history)]
+        fastest = max(map(abs, speeds), default=0.0)
         self._cascade.press((fastest, 0.0), self.pressure)
         self._hard = copy.copy(self._cascade)
         self._hard.ladders = [
@@ -184,10 +186,6 @@ class RoadHistory(RoadSliding):
         self._ends = dict[int, tuple[list[float], list[Array]]]()
         self._marches = dict[tuple[int, int], BandMarch]()
         self._cell = bands[-1].setup.grid.dx
-
-    def _speeds(self) -> list[float]:
-        initial = [self.job.initial.velocity[0]] if self.job.initial.state == "steady" else []
-        return [*initial, *(stage.velocity[0] for stage in self.job.history)]
 
     def notes(self) -> list[str]:
         """Return sentences on the chosen bands, and on branches that are not relaxed at the end of a slide."""

@@ -19,10 +19,10 @@ from ..march.budget import ErrorBudget, ErrorParts
 from ..march.choices import choices
 from ..march.curve import States, on_one_grid
 from ..march.scene import Setup
-from ..march.steady import Point
+from ..march.steady import Point, direction_of
 from ..parallel.slab import Array, Slab
 from ..physics.records import Certificate, Measures
-from .band import Rung, Vector, direction_of
+from .band import Rung, Vector
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands
 
@@ -281,7 +281,7 @@ class RoadSliding:
         box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self.rub(results)
         slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
         friction = outcome.friction + rubbed / pressure
-        direction = direction_of(velocity) if any(velocity) else (1.0, 0.0)
+        direction = direction_of(velocity)
         pressed = [rung for rung, weight in zip(outcome.rungs[-1], finest.weights, strict=True) if weight > 0.0]
         measures = Measures(
             pressure=finest.load,
@@ -328,7 +328,7 @@ class RoadSliding:
             )
             for k, (whole, (solver, steps, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
         ]
-        own = self._interface_share(outcome, friction)
+        own = 1.0 - outcome.friction / friction if friction > 0.0 else 0.0  # share of the interface
         with_interface = parts[0]._replace(method=parts[0].method + own * parts[1].method)
         rubs = self.loses or own > 0.0
         return ErrorBudget(with_interface if friction > 0.0 and rubs else None, parts[1])
@@ -337,9 +337,6 @@ class RoadSliding:
     def loses(self) -> bool:
         """True for a material with losses; without losses, friction of the waves is only a mesh error."""
         return len(relaxation_of(self.job.material)[2]) > 0
-
-    def _interface_share(self, outcome: BandOutcome, friction: float) -> float:
-        return 1.0 - outcome.friction / friction if friction > 0.0 else 0.0
 
 
 def make_states(job: Job, slab: Slab) -> States:

@@ -338,7 +338,7 @@ class SteadySliding:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
         unit, load = self.setup.units.height / self.setup.units.length, kernels.sum_of(p)
-        lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # rounding for an elastic body
+        lost = max(operator.loss(p, self.setup.size, direction_of(velocity)), 0.0)  # rounding for an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver | FreeSteadySolver, Convolution]:
@@ -398,7 +398,7 @@ def tolerance_of(asked: float, free: bool = False) -> float:
     return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 
-def _direction(velocity: Vector) -> tuple[float, float]:
+def direction_of(velocity: Vector) -> tuple[float, float]:
     """Return the unit vector of a velocity; the unit vector of x at rest."""
     speed = math.hypot(*velocity)
     return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)
