@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from parcontact.contact.certificate import Judge
 from parcontact.contact.problem import Approach, Box, InterfaceLaw, MeanPressure
 from parcontact.contact.projected import Projected
-from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
+from parcontact.contact.splitting import LEVEL_EXCESS, RELAXATION, Acceleration, Splitting, _Given
 from parcontact.effects.layer.response import Layer
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
@@ -147,6 +147,17 @@ def made(tolerance: float, comm: MPI.Intracomm = MPI.COMM_SELF, **body: Any) -> 
     operator, inverse = half_space.operator(fft), half_space.inverse(fft)
     assert isinstance(operator, Convolution)
     return Splitting(Judge(slab, float(np.ptp(HEIGHTS))), operator, inverse, tolerance, 1000), operator
+
+
+@pytest.mark.parametrize("mean", [0.05, 1.0, 20.0])
+def test_a_cold_start_is_full_contact_lowered_to_the_load(mean: float) -> None:
+    """Above a level where its load is at most LEVEL_EXCESS times the given one, to which it is then scaled."""
+    splitting, _ = made(1e-9)
+    p, full = np.zeros((N, N)), splitting.inverse.apply(HEIGHTS, np.empty((N, N)))
+    assert splitting._begin(_Given(HEIGHTS, MeanPressure(mean), Box(), 1e-9), p)
+    factor = np.ptp(p[p > 0.0]) / np.ptp(full[p > 0.0])
+    assert p.mean() == pytest.approx(mean, rel=1e-12)
+    assert 1.0 / LEVEL_EXCESS <= factor * (1.0 + 1e-9) <= 1.0 + 1e-6
 
 
 @pytest.mark.parametrize("mean", [0.05, 1.0, 20.0])
