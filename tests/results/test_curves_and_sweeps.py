@@ -47,12 +47,12 @@ def test_a_table_for_abaqus(curve: Path) -> None:
     wanted = {(v, p, t) for v, p, t in product((0.1, 1.0, 10.0), (1e5, 2e5), (20.0, 40.0))} - {(10.0, 2e5, 40.0)}
     reduced = {point: point[0] / 1e-3 * (SHARE if point[2] == 40.0 else 1.0) for point in wanted}
     assert {row[1:] for row in rows} == {point for point, frequency in reduced.items() if 25.0 < frequency < 6000.0}
-    low, reduced = f"{100 * SHARE:.3g} Hz", "(reduced to the reference temperature)"
+    low, words = f"{100 * SHARE:.3g} Hz", "(reduced to the reference temperature)"
     assert said[1:5] == [
         "left out: 4 of 11 points, at which the surface excites the rubber outside of its measured range",
-        f"10 m/s at 20 C (2 points) needs moduli at 10 kHz {reduced}, 0.5 decades above the measured 50 Hz to 3 kHz",
-        f"100 mm/s at 40 C (2 points) needs moduli at {low} {reduced}, 1.2 decades below the measured 50 Hz to 3 kHz",
-        f"to keep these points, measure the moduli from {low} to 10 kHz {reduced}: at these frequencies, or at "
+        f"10 m/s at 20 C (2 points) needs moduli at 10 kHz {words}, 0.5 decades above the measured 50 Hz to 3 kHz",
+        f"100 mm/s at 40 C (2 points) needs moduli at {low} {words}, 1.2 decades below the measured 50 Hz to 3 kHz",
+        f"to keep these points, measure the moduli from {low} to 10 kHz {words}: at these frequencies, or at "
         "temperatures whose shift reaches them",
     ]
     assert "not solved: 1 of 12 points are not solved yet" in said
