@@ -1,4 +1,5 @@
-"""Error measures of a contact pressure: sums over p and gaps, their reference length, and the certificate."""
+"""Computes how far a contact pressure is from the solution: sums over pressures and gaps, the length that gaps are
+divided by, and the errors in a `records.Certificate`."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,24 +18,24 @@ LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where
 
 @dataclass(frozen=True)
 class Lines:
-    """Grid lines along the sliding direction, for a body that is stiffer for waves along these lines.
+    """Grid lines along the sliding direction, for a body that is stiffer for waves that vary along these lines.
 
-    `axis` is the axis of maps, 0 or 1, along which the lines run. `contrast` c is the modulus of waves along the lines,
-    divided by the modulus of other waves. An error of the gap that varies along the lines causes c times the pressure
-    that other errors cause. The length of the certificate is therefore multiplied by the factor s,
+    `axis` is the axis of maps, 0 or 1, along which the lines run. `contrast` c is the modulus of waves that vary along
+    the lines, divided by the modulus of waves that do not. An error of the gap that varies along the lines causes c
+    times the pressure that other errors cause. The length of the certificate is therefore multiplied by the factor s,
 
         s^2 = v + (1 - v)/c^2.
 
-    Here v is the variance of u, weighted by the pressure, after the mean of each line is subtracted, divided by the
-    variance before.
+    Here v is the share of the variance of the displacement u that remains after the mean of each line is subtracted
+    from u. The variance is weighted by the pressure.
     """
 
     axis: int
     contrast: float
 
     def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
-        """Return the factor s (see the class) for the pressure p and its displacement u; collective. `iterate` has the
-        sums over p and u."""
+        """Return the factor s of `Lines` for a pressure p with the displacement u; collective. `iterate` holds the sums
+        over p and u."""
         loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
         if not self.axis:  # lines cross the rows of all ranks
             loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
@@ -47,14 +48,16 @@ class Lines:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Sums over a pressure p and its gap g at the approach d.
+    """Sums over a pressure p and its gap `g = u - h - d` at the approach d, with the displacement `u = A p`.
 
-    Over all points `load` is the sum of p, `gaps` of p g, `squares` of p u^2, and `energy` is half of the sum of p u,
-    with u = A p. Over free points `free_load` is the sum of p less its lower bound, and `free_gaps` that of its
-    products with g.
-
-    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes. If there is
-    no such approach, the first number exceeds the second.
+    * load: sum of p over all points;
+    * gaps: sum of p g over all points;
+    * energy: half of the sum of p u over all points;
+    * squares: sum of p u^2 over all points;
+    * free_load: sum of p less its lower bound, over points below the upper bound;
+    * free_gaps: sum of g times p less its lower bound, over the same points;
+    * between: lowest and highest d for which p meets all conditions of its bounds, if p is at a bound everywhere and
+      each bound has points; else None. If there is no such d, the first number exceeds the second.
     """
 
     d: float
@@ -68,14 +71,16 @@ class Iterate:
 
     @property
     def f(self) -> float:
-        """Return `<p, A p>/2 - <p, h + d>`, computed from gaps: a large offset of h then does not cost digits."""
+        """Return the functional `<p, A p>/2 - <p, h + d>` that the solution minimizes. The value is computed from gaps,
+        so that a large offset of h does not cost digits."""
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
-        """Return the iterate at the approach d for which `<p, g> = 0` over free points, to rounding.
+        """Return the iterate at the approach d for which `<p - lower bound, g> = 0` over points below the upper bound,
+        to rounding.
 
-        If no point is free, d is the mean of `between`; if all pressures are at one bound, `<p, g> = 0` over all
-        points. Without pressure d does not change.
+        If all pressures are at bounds, d is the midpoint of `between`. If all are at the same bound, d is such that
+        `<p, g> = 0` over all points. If p is 0 everywhere, d does not change.
         """
         if self.between is not None:
             d = 0.5 * sum(self.between)
@@ -87,7 +92,8 @@ class Iterate:
         return replace(self, d=d, gaps=gaps, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """Return the length that gaps are divided by in `Certificate`, from LEAST_HEIGHT times `height` to `height`."""
+        """Return the length that gaps are divided by in `Certificate`. It is at least LEAST_HEIGHT times `height` and
+        at most `height`, the height of the surface."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least
@@ -107,11 +113,11 @@ def certify(
     height: float,
     working: NDArray[np.bool_],
 ) -> tuple[float, float, Certificate]:
-    """Mark the points that the solver changes, and return their number, their sum of gaps, and the certificate of p;
-    collective.
+    """Set `working` to True at the points that the solver changes next, and to False elsewhere. Return the number of
+    these points, the sum of their gaps, and the certificate of p; collective.
 
-    u is the displacement under p, and `working` the map to mark. `mean` is the prescribed mean pressure, None if the
-    approach is given; `height` is the height of the surface.
+    u is the displacement under p at the approach of `iterate`. `mean` is the prescribed mean pressure, or None if the
+    approach is given. `height` is the height of the surface.
     """
     *sums, deepest = kernels.mark_working_set(p, u, h, iterate.d, box.lowest, box.highest, working)
     wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
@@ -142,8 +148,8 @@ def _approaches(slab: Slab, box: Box, p: Array, u: Array, h: Array) -> tuple[flo
 
 @dataclass(frozen=True)
 class Judge:
-    """Certifies pressures on one grid. `height` is the height of the surface; `lines` are given for a body that is
-    stiffer along them, None otherwise."""
+    """Certifies pressures p >= 0 on one grid. `height` is the height of the surface. `lines` is None unless the modulus
+    of the body depends on the direction of waves (`Lines`)."""
 
     slab: Slab
     height: float
@@ -152,8 +158,8 @@ class Judge:
     def certify(
         self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
     ) -> tuple[float, Certificate]:
-        """Mark the points that a solver changes under an admissible pressure p with displacement u. Return the approach
-        and the certificate of p; collective."""
+        """Return the approach and the certificate of an admissible pressure p with displacement u. Set `working` to
+        True at the points that a solver changes next, and to False elsewhere. Collective."""
         slab, given = self.slab, isinstance(control, Approach)
         iterate = form_iterate(slab, Box(), p, u, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
@@ -164,6 +170,7 @@ class Judge:
 
 
 def describe_failure(reason: str, certificate: Certificate, tolerance: float) -> str:
-    """Return a sentence with the reason and the residual of a failed solve; '' if the tolerance is met."""
+    """Return a sentence with the reason of a failed solve and the largest error in its certificate; '' if the tolerance
+    is met."""
     worst = certificate.worst
     return "" if worst <= tolerance else f"{reason}: the residual is {worst:.3g} where {tolerance:.3g} was asked for"

@@ -1,7 +1,8 @@
 """Fused loops over the rows of this rank: each reads every map once and returns partial sums for one Allreduce.
 
-Sums are taken in double precision, first along rows and then over rows: their rounding error grows with the sum of
-both numbers of points, not with the product."""
+Sums are taken in double precision, first along rows and then over rows, so that their rounding errors grow with nx + ny
+and not with nx ny.
+"""
 
 import numpy as np
 
@@ -35,12 +36,15 @@ def contact_sums(p, u, h, d, lowest, highest):
 
 @loop
 def mark_working_set(p, u, h, d, lowest, highest, working):
-    """Mark in `working` the points with p above `lowest` and the points that penetrate (g < 0), with `g = u - h - d`.
-    Points at `highest` with g <= 0 are held: they are not marked. Return five numbers: the sum of `(p - lowest) |g|`
-    over points that are not held, the number of marked points and their sum of g, the number of held points, and the
-    largest -g of points below `highest`.
+    """Set `working` to True at points with p above `lowest` and at points that penetrate (g < 0), with `g = u - h - d`,
+    and to False elsewhere. Points at `highest` with g <= 0 are held: they do not belong to the working set. Return five
+    numbers:
 
-    The lowest gap is stored for each column: a single running minimum would not be vectorized.
+    * the sum of `(p - lowest) |g|` over all points that are not held;
+    * the number of points in the working set;
+    * the sum of g over the working set;
+    * the number of held points;
+    * the largest -g of points below `highest`.
     """
     wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0
     least, deepest = np.empty(p.shape[1]), -np.inf
@@ -71,7 +75,8 @@ def mark_working_set(p, u, h, d, lowest, highest, working):
 
 @loop
 def advance(p_old, t, step, lowest, highest, p):
-    """Put `p_old - step t`, limited to the bounds, into p. Return the sums of p and of |change by the limits|."""
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p, and the sum of the absolute changes
+    that the limits have made."""
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0
@@ -89,7 +94,7 @@ def advance(p_old, t, step, lowest, highest, p):
 
 @loop
 def gap_residual(working, u, h, d, r):
-    """Put the gap `u - h - d` on the working set, and 0 elsewhere, into r."""
+    """Set r to the gap `u - h - d` on the working set and to 0 elsewhere."""
     for j in range(r.shape[0]):
         for i in range(r.shape[1]):
             r[j, i] = u[j, i] - h[j, i] - d if working[j, i] else 0.0
@@ -97,8 +102,9 @@ def gap_residual(working, u, h, d, r):
 
 @loop
 def step_products(working, u, h, d, u_old, z, t):
-    """Return the sums over the working set of z, t, c, r z, c z and r t, where `c = u - u_old` and `r = u - h - d`,
-    rounded to the precision of z."""
+    """Return the sums over the working set of z, t, c, r z, c z and r t. Here z is the preconditioned residual, t the
+    direction, `c = u - u_old` the last change of the displacement, and `r = u - h - d`, rounded to the precision of z.
+    """
     sum_z, sum_t, sum_change, r_z, change_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_change, row_r_z, row_change_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -123,7 +129,8 @@ def step_products(working, u, h, d, u_old, z, t):
 
 @loop
 def turn(working, z, beta, mean, t):
-    """Put `z + beta t - mean` on the working set and 0 elsewhere into t."""
+    """Replace the direction t by `z + beta t - mean` on the working set and by 0 elsewhere. `mean` is the number to
+    subtract."""
     for j in range(t.shape[0]):
         for i in range(t.shape[1]):
             t[j, i] = z[j, i] + beta * t[j, i] - mean if working[j, i] else 0.0
@@ -131,7 +138,7 @@ def turn(working, z, beta, mean, t):
 
 @loop
 def sum_of(a):
-    """Return the sum of a."""
+    """Return the sum of a over the rows of this rank, in double precision."""
     result = 0.0
     for j in range(a.shape[0]):
         row = 0.0

@@ -1,22 +1,32 @@
 """The preconditioner of the contact solver: K with residuals extended beyond the contact.
 
-A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R r`
-(R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too. With an
-extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. This operator is the inverse of `R A R`
-if e = E r minimizes `<e, K e>`. At a distance from c this e varies over lengths of about the distance, and so do the
-means over cells of all sizes that are used here. With s the sum of r over a cell, w the number of its points in c, and
-I the linear interpolation between cells of twice the length,
+A preconditioner K is close to the inverse of A on the whole grid. It turns a residual r on a set c of points into the
+correction `R K R r` (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface
+outside c, too. With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is, and is the
+inverse of `R A R` if e = E r minimizes `<e, K e>`. At a distance from c this e varies over lengths of about the
+distance. The extension used here does so, too: it consists of means of r over cells of all sizes. With s the sum of r
+over a cell, w the number of points of c in the cell, and I the linear interpolation from the cells of the next coarser
+grid,
 
     e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
-from the largest cell, above which e is 0, down to single points, with f = 0. The number of iterations then hardly
-grows with the grid. The grid is taken as periodic, also for free boxes. Maps of cells are in single precision.
+from the largest cell, above which e is 0, down to single points, with f = 0. The number of iterations then hardly grows
+with the grid. The grid is taken as periodic, also for free boxes. Maps of cells are in single precision.
 
-Each cell joins two by two cells of the next finer grid, or a pair of them. Pairs come first, until points are about as
-far from each other along x as along y, as fields that are smooth over square cells are not smooth over long ones. A
-positive number of pairs joins along x, a negative one along y. The loops between points and cells take the sides of a
-cell, each 2, or None for 1, so that they are compiled without the branches that a shape does not need. Interpolation
-takes 3/4 of the own cell of a point and 1/4 of the nearest other one.
+Each cell joins two by two cells, or only two cells, of the next finer grid. Pairs of cells are joined first, until
+points are about as far from each other along x as along y, as fields that are smooth over square cells are not smooth
+over long ones. Interpolation takes 3/4 of the value of a point's own cell and 1/4 of that of the nearest other cell,
+along each side.
+
+The functions and loops have these arguments:
+
+* pairs: the first |pairs| levels join two cells only, along x if `pairs` > 0 and along y if `pairs` < 0;
+* wide, tall: points of a cell along x and y, each 2, or None for 1: the loops are compiled without branches they do not
+  need;
+* above: 1 if this rank's first cell has a row of points on the rank before, else 0;
+* neighbours: rows next to the rows of this rank (`row_of`);
+* known: weight `w/(w + f)` of each cell, and of each point 1 in c and 0 outside c; interpolation adds `1 - known` times
+  the interpolated value.
 """
 
 import math
@@ -35,8 +45,8 @@ from .problem import Operator
 
 @loop
 def row_of(own, neighbours, j):
-    """Return row j of a map whose rows `own` are on this rank. `neighbours` holds the rows below row 0 first and the
-    rows above the last row last."""
+    """Return row j of a map whose rows `own` are on this rank. `neighbours` holds first the rows after the last row,
+    and then the rows before row 0, for which j < 0."""
     if j < 0:
         return neighbours[neighbours.shape[0] + j]
     return own[j] if j < own.shape[0] else neighbours[j - own.shape[0]]
@@ -44,7 +54,7 @@ def row_of(own, neighbours, j):
 
 @loop
 def add_up(points, neighbours, above, wide, tall, cells):
-    """Put the sums of `points` over the points of each cell into `cells`."""
+    """Set each cell of the map `cells` to the sum of the map `points` over the points of the cell."""
     height = 1 if tall is None else 2
     second = np.float32(height - 1)
     pairs = points.shape[1] // 2
@@ -66,7 +76,7 @@ def add_up(points, neighbours, above, wide, tall, cells):
 
 @loop
 def add_up_back(cells, neighbours, above, wide, tall, points):
-    """Add the value of each cell in `cells` to its points; the transpose of `add_up`."""
+    """Add the value of each cell in `cells` to `points` at the points of the cell; the transpose of `add_up`."""
     pairs, height = points.shape[1] // 2, 1 if tall is None else 2
     for j in range(points.shape[0]):
         cell, out = row_of(cells, neighbours, (j + above) // height), points[j]
@@ -83,7 +93,7 @@ def add_up_back(cells, neighbours, above, wide, tall, points):
 
 @loop
 def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
-    """Add `1 - known` times the linear interpolation between `cells` to each point of `points`."""
+    """Add `1 - known` times the linear interpolation between `cells` to the map `points`."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
     line = np.empty(columns + 2, np.float32)
     for j in range(points.shape[0]):
@@ -113,7 +123,8 @@ def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
 
 @loop
 def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
-    """Add `1 - known` times the values in `points` to `cells`, by the weights of the interpolation."""
+    """Set `cells` to the transpose of `interpolate_cells`: sums of `1 - known` times the map `points`, with the weights
+    of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
     width, height = columns if wide is None else 2 * columns, 1 if tall is None else 2
     line = np.empty(width + 2, np.float32)
@@ -148,10 +159,11 @@ Map = NDArray[Any]
 
 @dataclass(frozen=True)
 class CellLevel:
-    """Sums over cells, interpolation between them, and the transposes of both, for one step of `regrid.pyramid_steps`.
+    """Transfers between one grid and the next coarser grid of cells (`cell_levels`): sums over cells, interpolation
+    between cells, and the transposes of both.
 
-    Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All methods except
-    `add_up` add their result to their last argument. Collective.
+    Maps hold the rows of this rank. `known` holds the weights of the module: interpolation does not change a point with
+    the weight 1. `add_up` and `interpolate_back` replace their last argument, the other methods add to it. Collective.
     """
 
     step: regrid.PyramidStep
@@ -198,19 +210,21 @@ class CellLevel:
 
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
-    """Return the levels from a grid to a single cell, the finest first. The first `pairs` levels join pairs of cells,
-    all further levels join two by two cells."""
+    """Return the levels from a grid to a single cell, the finest first. The first |`pairs`| levels join two cells,
+    along x if `pairs` > 0 and along y if `pairs` < 0. All further levels join two by two cells."""
     return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """Interpolate from the largest cells down to points, adding each grid to the next finer one; collective."""
+    """Interpolate `maps`, the finest first, from each grid to the next finer one, and add the result to the map there;
+    collective."""
     for k, level in reversed(list(enumerate(levels))):
         level.interpolate(maps[k + 1], known[k], maps[k])
 
 
 def interpolate_back(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """Apply the transpose of `interpolate`, from points to the largest cells; collective."""
+    """Apply the transpose of `interpolate` to the first of `maps`, the map of points, and overwrite the maps of cells
+    with the results; collective."""
     for k, level in enumerate(levels):
         level.interpolate_back(known[k], maps[k], maps[k + 1])
 
@@ -221,8 +235,8 @@ Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each 
 
 
 class Grids(NamedTuple):
-    """Coarser grids for a preconditioner: at most `most`, all if None. The first `pairs` grids double cells along one
-    side only (`cell_levels`)."""
+    """Number of coarser grids of a preconditioner: at most `most`, or all if `most` is None. The first |`pairs`| of
+    these grids double cells along x only (`pairs` > 0) or along y only (`pairs` < 0)."""
 
     most: int | None = None
     pairs: int = 0
@@ -232,10 +246,11 @@ ALL = Grids()
 
 
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
-    """Return the coarser grids to use for points at the distances dx and dy.
+    """Return the coarser grids to use for a grid with the point spacings dx and dy.
 
     If dx and dy differ, cells are first doubled along the shorter side until they are about square. Points further
-    apart than `reach` do not interact: cells are not enlarged beyond this length, or twice the point distance.
+    apart than `reach` do not interact. Cells are therefore not enlarged beyond `reach` or twice the larger spacing,
+    whichever is larger.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
@@ -246,11 +261,8 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
 
 
 class ExtendedPreconditioner:
-    """Preconditioner K on a set of points, with residuals extended by E. It holds two maps in single precision on each
-    coarser grid.
-
-    `known` is `w/(w + f)` of each cell; on the finest grid it marks the set.
-    """
+    """Preconditioner `R E' K E R` on a set of points, with residuals extended by E. It holds two maps in single
+    precision on each coarser grid."""
 
     def __init__(self, slab: Slab, larger: Grids = ALL) -> None:
         most, pairs = larger
@@ -264,7 +276,8 @@ class ExtendedPreconditioner:
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
-        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
+        """Replace the residual r, which must be 0 outside the set `working`, by the preconditioned residual `E' K E r`,
+        with the operator `preconditioner` as K. The result is valid on the set only. Collective."""
         known: Maps = [working, *self._known]
         maps: Maps = [r, *self._cells]
         self._add_up(known)
@@ -295,8 +308,8 @@ class ExtendedPreconditioner:
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
-    """Return the number of points in each cell of a level along a side with `points` points; the last may have
-    fewer."""
+    """Return the number of points in each cell of a level along a side with `points` points. The last cell may have
+    fewer points than the others."""
     length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 

@@ -1,24 +1,25 @@
-"""The problem of a contact solve: its operators, control, and bounds of pressures; its memory, precision and result.
+"""The problem of a contact solve (operators, control, bounds of pressures), and a solve's memory, precision and result.
 
-`Box` bounds the pressure, for contact without adhesion (p >= 0), for a counterbody that yields at its hardness H
-(0 <= p <= H), or for a fluid of the pressure q in the gap (p >= q):
+`Box` bounds the pressure, for contact without adhesion (p >= 0), for a counterbody that yields at its hardness H (0 <=
+p <= H), or for a gap that holds a fluid of pressure q (p >= q):
 
     lowest <= p <= highest,    g >= 0 where p < highest,    g <= 0 where p > lowest,
 
 with the gap `g = u - h - d`. Where p = H the rigid surface yields by -g. Each solve starts from the full heights:
 earlier yielding is not remembered (A. Almqvist, F. Sahlin, R. Larsson, S. Glavatskih, Tribol. Int. 40 (2007) 574). The
 mean pressure must be between the bounds. Points with a pressure between the bounds are free: they determine the
-approach, and they are scaled to the load.
+approach, and their pressures are scaled to the load.
 
-`InterfaceLaw` lets the mean planes of two surfaces approach under a pressure, as roughness finer than the grid is
-squeezed. This approach, the closing c(p), rises with p, so that the problem is monotone and has one solution:
+`InterfaceLaw` lets the mean planes of two surfaces approach under a pressure, because the pressure squeezes roughness
+finer than the grid. This approach, the closing c(p), rises with p, so that the problem is monotone and has one
+solution:
 
     p >= 0,    w = A p + c(p) - h - d >= 0,    p w = 0.
 
 A point with pressure penetrates by `h + d - c(p)`.
 
 Directions, residuals and preconditioned residuals may be rounded to single precision: the step along a direction and
-the image of the new iterate are computed in double precision. In full contact, which one step solves, the result is
+the image of the new iterate are computed in double precision. Full contact is solved by a single step; its result is
 then correct to little more than single precision.
 """
 
@@ -42,14 +43,16 @@ class Constraint(Protocol):
     """Conditions on pressure p and gap at each point. Maps have the shape (rows of this rank, nx)."""
 
     def touches(self, p: Array) -> Mask:
-        """Return a map that is not 0 where the surfaces touch under an admissible pressure; the map may be p itself."""
+        """Return a map that is not 0 where the surfaces touch under an admissible pressure p, and 0 elsewhere. The map
+        may be p itself."""
 
     def project(self, p: Array) -> None:
         """Replace p by the nearest admissible pressure."""
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """Solve `p + gamma c(p) = s + gamma h` at each point and limit p to its bounds; put `2 p - s` into `reflected`.
-        Return the sum of `reflected` on this rank."""
+        """Solve `p + gamma c(p) = s + gamma h` at each point, limit p to its bounds, and put `2 p - s` into
+        `reflected`. Return the sum of `reflected` on this rank. s is the map of `splitting`, and gamma its parameter
+        [pressure/length]."""
 
     def add_closing(self, u: Array, p: Array) -> Array:
         """Return `u + c(p)`; the map u itself if there is no closing."""
@@ -66,7 +69,8 @@ class Box:
     highest: float = math.inf
 
     def touches(self, p: Array) -> Mask:
-        """Return a map that is not 0 where p is above its lower bound, which includes points that yield."""
+        """Return a map that is not 0 where p is above its lower bound, also where the counterbody yields, and 0
+        elsewhere."""
         return p if self.lowest == 0.0 else p > self.lowest
 
     def admits(self, mean: float) -> bool:
@@ -86,7 +90,7 @@ class Box:
         return u
 
     def in_units(self, pressure: float, length: float) -> "Box":
-        """Return the bounds in the given unit of pressure."""
+        """Return the bounds in the unit `pressure`. The unit `length` is not used."""
         return Box(self.lowest / pressure, self.highest / pressure)
 
 
@@ -100,11 +104,12 @@ MOST_TAKEN = 0.5  # tuning: largest share of its load that a cell loses
 
 
 def take_back(box: Box, p: Array, added: Array) -> None:
-    """Remove the load that limiting pressures to their bounds has `added`, from the cell of CELL x CELL points in which
-    it was added; local to this rank.
+    """Reduce pressures near the points to which limiting p to its bounds has added load; local to this rank.
 
-    A spot in contact then keeps its load, and long waves of the displacement hardly change. One factor for all
-    pressures would also unload spots to which nothing was added.
+    `added` is the map of what the limits have added to p. In each cell of CELL x CELL points, p less its lower bound is
+    multiplied by one factor, so that the cell loses the sum of `added` over its points, but at most the share
+    MOST_TAKEN of its load. A spot in contact then keeps its load, and long waves of the displacement hardly change. One
+    factor for all pressures would also unload spots to which nothing was added.
     """
     columns = np.arange(0, p.shape[1], CELL)
     for top in range(0, p.shape[0], CELL):
@@ -117,10 +122,10 @@ def take_back(box: Box, p: Array, added: Array) -> None:
 
 
 def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> None:
-    """Scale an admissible p from the sum `load` to the sum `total`; collective.
+    """Scale an admissible p from its sum `load` to the wanted sum `total`; collective.
 
-    Differences to the lower bound are scaled at points below the upper bound. If these points cannot carry the load, p
-    is replaced by a weighted mean of p and a bound. If p is at its lower bound everywhere, it becomes uniform.
+    At points below the upper bound, p less its lower bound is scaled. If these points cannot carry `total`, p is
+    replaced by a weighted mean of p and a bound. If p is at its lower bound everywhere, p becomes uniform.
     """
     even, span = box.lowest * slab.points, box.highest - box.lowest
     if load <= even * (1.0 + slab.points * np.finfo(np.float64).eps):
@@ -293,7 +298,8 @@ class Operator(Protocol):
 
 
 class Operators(NamedTuple):
-    """Operator A of a body on one grid, from pressure to displacement, and a preconditioner K close to its inverse."""
+    """Operator A of a body on one grid, from pressure to displacement, and a preconditioner K that is close to the
+    inverse of A."""
 
     operator: Operator
     preconditioner: Operator
@@ -324,10 +330,11 @@ Control = MeanPressure | Approach
 
 @dataclass(frozen=True)
 class Problem:
-    """Find a pressure p between the bounds of the `constraint` whose gap `g = A p - h - d` meets its conditions.
+    """Find a pressure p between the bounds of the `constraint` whose gap `g = A p - h - d` meets the conditions of the
+    `constraint`.
 
-    `operator` is A, `preconditioner` is K, close to its inverse, and `heights` is the map h. `control` gives the
-    mean of p or the approach d.
+    `operator` is A, `preconditioner` is K, which is close to the inverse of A, and `heights` is the map h. `control`
+    gives the mean of p or the approach d.
     """
 
     operator: Operator
@@ -339,10 +346,11 @@ class Problem:
 
 @dataclass(frozen=True)
 class Contact:
-    """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
+    """Result of a solve that has converged or was given up. Maps have the shape (rows of this rank, nx).
 
     `p` is the array that was passed as the start. `u = A p` is an array of the solver, overwritten by the next solve.
-    `failure` is empty, or states why the tolerance was not reached.
+    `d` is the approach, and `certificate` holds the errors of p. `failure` is empty, or states why the tolerance was
+    not reached.
     """
 
     p: Array
@@ -363,15 +371,17 @@ LOOSE = 1e-5  # accuracy: least tolerance on a certificate with directions in si
 
 
 def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:
-    """Return the floating-point type of search directions for a solver with this tolerance."""
+    """Return the floating-point type of search directions: single precision if the `tolerance` of the solver is at
+    least `loose`, else double precision."""
     return np.float32 if tolerance >= loose else np.float64
 
 
 def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compliance: float, length: float) -> float:
-    """Return the smallest certificate that rounding allows, with gaps divided by `length`; collective.
+    """Return the smallest error that a certificate can have because of rounding, with gaps divided by `length`;
+    collective.
 
-    `lengths` are the maps of heights and displacements. A rounding error of p moves the body by this error times the
-    largest `compliance`.
+    `lengths` are maps of heights and of displacements. `compliance` is the largest displacement per pressure: a
+    rounding error of p displaces the body by at most `compliance` times this error.
     """
     sizes = slab.reduce((), [float(np.abs(each).max(initial=0.0)) for each in (*lengths, p)])
     sizes[-1] *= compliance
@@ -379,13 +389,15 @@ def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compli
 
 
 class Workspace:
-    """A pressure, two displacements, a search direction, and one byte per point.
+    """A pressure, two displacements, a search direction, and one byte per point for the working set.
 
     All solvers of a run share one workspace. A solve overwrites all maps and leaves `A p` in `displacement`, valid
     until the next solve. Read maps as attributes at each use: they may be swapped or replaced.
 
-    Parameters: `kept`, the type of displacements, single precision if the operator is; `tolerance` of solves, which
-    decides the precision of directions.
+    Parameters:
+
+    * tolerance: smallest tolerance of the solves, from which the type of directions follows;
+    * kept: type in which displacements are stored; single precision if the operator works in single precision.
     """
 
     def __init__(self, slab: Slab, tolerance: float, kept: type[np.floating] = np.float64) -> None:

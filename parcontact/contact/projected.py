@@ -1,21 +1,21 @@
-"""Projected steps for operators that are not symmetric, in light contact and free boxes.
+"""Projected steps for operators that need not be symmetric, in light contact and free boxes.
 
-Minimal residual steps, each projected onto the admissible pressures. On the working set c (pressure or penetration) of
-an admissible pressure x, a step combines the preconditioned residual t and the last two changes of x so that the sum of
-squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean over c). Then negative pressures are put
-to 0, x is scaled to the load, and A is applied to it, so that the stored changes have exact images. A need not be
-symmetric. Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
+Steps that minimize the residual, each projected onto the admissible pressures. On the working set c (pressure or
+penetration) of an admissible pressure x, a step combines the preconditioned residual t and the last two changes of x so
+that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean over c). Then negative
+pressures are put to 0, x is scaled to the load, and A is applied to x, so that the image of each stored change is
+exact. Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
 
-In a free box (`FreeSteadySolver`) the method of proximal points follows where these steps do not help. The symbol of a
-padded box has waves with a negative real part, so that its resolvents may not exist (`splitting`). There the contact is
-the limit of contacts with less loss: with S symmetric and positive, the contact p' of the operator `A + S` for heights
-`h + S p` satisfies
+In a free box (`FreeSteadySolver`) the method of proximal points follows if projected steps do not converge. The symbol
+of the padded box has a negative real part at some waves, so that the resolvents of `splitting` may not exist. Then the
+contact is found as the limit of a sequence of contacts of bodies with less loss. With S symmetric and positive, the
+contact p' of the operator `A + S` for heights `h + S p` satisfies
 
     A p' - h - d = S (p - p') where there is pressure,
 
 which is the contact for A and h when p' = p. As A is positive, each step reduces the error of p in the norm of S, also
-if p' is inexact (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877). S is the smallest that limits the loss
-tangent of `A + S` to 1: `|Im A| - Re A` for waves whose tangent is larger, 0 for the others.
+if p' is inexact (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877). S is the smallest operator that limits the
+loss tangent of `A + S` to 1: its symbol is `|Im A| - Re A` for waves whose tangent is larger, and 0 for other waves.
 """
 
 import math
@@ -38,8 +38,9 @@ DIRECTIONS = 3  # the residual and the last two changes
 
 
 class Projected:
-    """Solver by projected steps on one grid. It holds DIRECTIONS maps of steps, their images, the displacement, a byte
-    per point, and the maps of `ExtendedPreconditioner`.
+    """Solver by projected steps on one grid. It holds DIRECTIONS maps of directions (the preconditioned residual and
+    earlier changes of x), the images of these maps under A, the displacement, the working set with a byte per point,
+    and the maps of `ExtendedPreconditioner`.
 
     `grids` are the coarser grids of the extension (`preconditioner.grids_for`).
     """
@@ -88,7 +89,8 @@ class Projected:
         return self.judge.certify(p, self._u, h, MeanPressure(mean), self._working)
 
     def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
-        """Move x to an admissible pressure with the sum `load`, and update its image u; collective."""
+        """Move the pressure x to an admissible pressure with the sum `load`, and update its displacement `u = A x`;
+        collective. `working` is the working set of the old x."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
         kernels.gap_residual(working, u, h, level, t)
@@ -210,8 +212,8 @@ Symbol = NDArray[np.inexact]
 
 
 class FreeSteadySolver:
-    """Solver of steady sliding in a free box, with the methods of `SteadySolver`. It holds the maps of `Projected`; if
-    projected steps fail, also the maps of `_Points`."""
+    """Solver of steady sliding in a free box. It has the same methods as `SteadySolver`. It holds the maps of
+    `Projected` and, if projected steps fail, the maps of the method of proximal points."""
 
     def __init__(
         self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, grids: Grids
@@ -221,7 +223,8 @@ class FreeSteadySolver:
         self._projected = Projected(judge, operator, preconditioner, grids)
 
     def hold_all(self) -> "_Points":
-        """Allocate all maps that a solve may need, and return their solver."""
+        """Allocate all maps that a solve may need, and return the solver by proximal points that holds the further
+        ones."""
         return _Points(self._judge, self._operator, self._preconditioner, self._grids)
 
     def solve(self, h: Array, mean: float, start: Array) -> Contact:

@@ -9,19 +9,20 @@ The solution minimizes `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. W
 and `C` = subtract the mean over it, one iteration is:
 
 1. The working set consists of the contact (p > 0) and of the points that penetrate (g < 0).
-2. The residual is `r = C R g`, preconditioned `z = C R E' K E r`. K is close to the inverse of A, and E extends r
-   beyond the set (`preconditioner`).
-3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction and corrects an inexact
-   last step. t = z if this is a much smaller descent than z, or if much of the last step was cut off.
-4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. Much load that the limits add is first
-   taken back near by (`problem.take_back`). If the hardness is far below the stiffness, alpha is limited, so that few
-   points change from one bound to the other.
+2. The residual is `r = C R g`, and the preconditioned residual is `z = C R E' K E r`. K is close to the inverse of A,
+   and E extends r beyond the set (`preconditioner`).
+3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction, and corrects for a last
+   step that was not exact. beta is 0, so that t = z, if f falls much less along `z + beta t` than along z, or if the
+   bounds cut off much of the last step.
+4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the limits add much load, this load is
+   first removed near the points where it was added (`problem.take_back`). If the hardness is far below the stiffness,
+   alpha is limited, so that few pressures change from one bound to the other.
 5. f must not rise. Otherwise the step is halved, and the direction is forgotten.
 
 The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
-step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
-MAX_STEP_RATIO, or the certificate no longer falls, the rest of the solve makes exact steps. On lines of points and on
-cells much longer than wide, all steps are exact.
+step near 1 replaces it. `A p` of the next iterate gives `<t, A t>` and thus the exact step. If the ratio of the exact
+step to the step made, or its inverse, exceeds MAX_STEP_RATIO, or if the certificate no longer falls, the rest of the
+solve makes exact steps. On lines of points and on cells much longer than wide, all steps are exact.
 
 With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p - h` over free points, weighted by p,
 so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small step (D.
@@ -63,10 +64,16 @@ NOT_FINITE = "met numbers that are not finite"
 class ContactSolver:
     """Conjugate-gradient solver of frictionless contacts on one grid.
 
-    Parameters: `workspace`, the maps for all its intermediate results; `height` of the surface, from its lowest to its
-    highest point [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the
-    extension of residuals (`preconditioner.grids_for`); `free`, True for a box that does not repeat; `further`, which
-    makes a preconditioner from that of a half space (`physics.halfspace.Response.preconditioner`).
+    Parameters:
+
+    * workspace: maps for all intermediate results;
+    * height: height of the surface, from its lowest to its highest point [unit of h];
+    * tolerance: largest error that a certificate may have;
+    * max_iterations: limit on the iterations of a solve;
+    * grids: coarser grids for the extension of residuals (`preconditioner.grids_for`);
+    * free: True for a box that does not repeat;
+    * further: function from a slab and the preconditioner of a half space to the preconditioner of the body
+      (`physics.halfspace.Response.preconditioner`).
     """
 
     def __init__(
@@ -123,8 +130,8 @@ class ContactSolver:
                 slope = 0.0
 
     def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
-        """Scale the admissible pressure p to the load, and return the contact with its certificate; collective. If p
-        does not solve the problem, `otherwise` is the reason of failure."""
+        """Scale the admissible pressure p to the load, and return the contact with its certificate; collective. If the
+        certificate exceeds the tolerance of the solver, `failure` of the contact is the text `otherwise`."""
         iterate = self._begin(problem, p)
         *_, certificate = self._certify(problem, p, iterate)
         failure = "" if certificate.worst <= self.tolerance else otherwise

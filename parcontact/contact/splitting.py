@@ -1,15 +1,17 @@
 """Steady contact by accelerated splitting: a law of the interface, or an operator that is not symmetric.
 
-Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`constraint`). A is diagonal in
-Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x shifted to the
-mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `Constraint.resolve`, and with a map s,
+Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`problem.InterfaceLaw`). A is
+diagonal in Fourier space and c in real space, so that `1 + gamma A` and `1 + gamma c` are each inverted exactly. J_c(s)
+is the pressure of `problem.Constraint.resolve`. With given d, J_A(x) is `(1 + gamma A)^-1 (x + gamma d)`. With given
+P0, J_A(x) is `(1 + gamma A)^-1 x` plus the constant that gives the mean P0. Iterations change a map s:
 
     p = J_c(s),    y = J_A(2 p - s),    f = y - p,    s <- s + f
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
-(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents.
-gamma is a multiple of the pressure of the start divided by its displacement, or by the sum of its displacement and
-closing if the start is near the solution: in light contact the law is softer than the body. The first map is
+(1979) 964). The iteration converges for every gamma > 0 and every A with a real part >= 0, also for very large loss
+tangents. gamma is a multiple of the pressure of the start divided by its displacement, or by the sum of its
+displacement and closing if the start is near the solution: in light contact the law is softer than the body. The first
+map is
 
     s = p + gamma c(p) - gamma h where there is pressure,    s = -gamma (A p - d) elsewhere.
 
@@ -18,12 +20,13 @@ Anderson acceleration takes the last changes ds_j of s and df_j of f into accoun
     theta = argmin |f - sum_j theta_j df_j|,    s <- s + R f - sum_j theta_j (ds_j + R df_j),
 
 with the relaxation R (D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715).
-Without earlier changes this is the plain iteration, relaxed. Changes are stored in single precision: s is advanced by
-the change that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may differ from the load
-by decades before convergence; solves fail if s is then rescaled to the load.
+Without earlier changes the step is `s <- s + R f`. Changes are stored in single precision: s is advanced by the change
+that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may differ from the load by decades
+before convergence. s is never rescaled to the load, because solves fail then.
 
 Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As a certificate takes
-an application of A, it is computed when the rms of f is small enough, judged by the last ratio of certificate to rms.
+an application of A, the certificate is computed only when the rms of f is small enough, judged by the last ratio of
+certificate to rms.
 
 For a lossy body sliding at constant velocity, seen from the rigid surface, A is positive but not symmetric, and there
 is no energy to minimize. `SteadySolver` solves this contact in a periodic box. In light contact, and from a start that
@@ -52,7 +55,8 @@ TRACE_SHARE = 1e-8  # accuracy: share of the mean square of changes that is adde
 
 
 class Acceleration:
-    """Anderson acceleration on one grid. It holds f and, in single precision, DEPTH changes of s and of f."""
+    """Anderson acceleration on one grid, with the residual f and the map s of the module. It holds f and, in single
+    precision, the last DEPTH changes of s and of f."""
 
     def __init__(self, slab: Slab) -> None:
         self.slab, self.f = slab, slab.empty()
@@ -67,7 +71,8 @@ class Acceleration:
         self._against = np.zeros(DEPTH)
 
     def residual(self, y: Array, p: Array, shift: float) -> float:
-        """Compute the residual `f = y + shift - p` and store its change. Return its rms; collective."""
+        """Compute the residual `f = y + shift - p` and store its change. Return the rms of f; collective. `shift` is
+        the constant for which `y + shift` is J_A(2 p - s)."""
         if self._last < 0:
             square = self.slab.sum(_first(y, p, shift, self.f))[0]
             return math.sqrt(square / self.slab.points)
@@ -173,10 +178,11 @@ PLAIN, PLAIN_AFTER_STALL = 3, 25  # tuning: steps without acceleration that foll
 class Splitting:
     """Solver of steady contact by accelerated splitting on one grid.
 
-    `operator` is A of a periodic box: waves of the padded operator of a free box may have a negative real part.
-    `inverse` is an operator K close to the inverse of A. `tolerance` limits the certificate, and `most` the number of
-    steps. Laws and pressures are in the units of A. The solver holds two maps, a byte for each point, the maps of
-    `Acceleration` and, during a solve, the symbol of `resolvent`.
+    `operator` is A of a periodic box: the symbol of the padded operator of a free box may have a negative real part at
+    some waves. `inverse` is an operator K that is close to the inverse of A. `tolerance` limits the errors of the
+    certificate, and `most` the number of steps of a solve. Interface laws and pressures are in the units of A. The
+    solver holds two maps, a byte for each point, and the maps of `Acceleration`. During a solve, the solver also holds
+    the symbol of `resolvent`.
     """
 
     def __init__(self, judge: Judge, operator: Convolution, inverse: Operator, tolerance: float, most: int) -> None:
@@ -193,11 +199,12 @@ class Splitting:
     def solve(
         self, h: Array, control: Control, law: Constraint, start: Array, tolerance: float | None = None
     ) -> Contact:
-        """Solve for heights h from the pressure `start`, which is overwritten by the solution; collective.
+        """Solve for heights h and the constraint `law` from the pressure `start`, which is overwritten by the solution;
+        collective.
 
-        `tolerance` replaces the tolerance of the solver. A start that is 0 everywhere is replaced by the pressure of
-        full contact, lowered to the load. A prescribed mean pressure must be positive. The displacement of the result
-        is `u = A p`, without the closing.
+        `tolerance` replaces the tolerance of the solver. A start that is 0 everywhere is replaced by K h less a
+        constant, limited to the bounds and scaled to a given mean pressure, which must be positive. The displacement of
+        the result is `u = A p`, without the closing.
         """
         given, p, steps = _Given(h, control, law, tolerance or self.tolerance), start, 0
         cold = self._begin(given, p)
@@ -336,8 +343,13 @@ class SteadySolver:
     """Solver of steady sliding in a periodic box. It holds the maps of `Projected` during projected steps, and the maps
     of `Splitting` afterwards.
 
-    Parameters: `operator` A; `preconditioner` K near its inverse; `tolerance` on the certificate; `most`, a limit on
-    the steps of `Splitting`; `grids`, the coarser grids of projected steps (`preconditioner.grids_for`).
+    Parameters:
+
+    * operator: A of the body;
+    * preconditioner: K, which is close to the inverse of A;
+    * tolerance: largest error that a certificate may have;
+    * most: limit on the steps of `Splitting`;
+    * grids: coarser grids of projected steps (`preconditioner.grids_for`).
     """
 
     def __init__(
@@ -353,7 +365,8 @@ class SteadySolver:
         self.tolerance, self.most, self.grids = tolerance, most, grids
 
     def hold_all(self) -> tuple[Splitting, Convolution]:
-        """Allocate and return all maps that a solve may need; projected steps alone need fewer."""
+        """Allocate all maps that a solve may need, and return the objects that hold these maps: the `Splitting` solver
+        and an operator `(1 + gamma A)^-1`. Projected steps alone need fewer maps."""
         splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
         return splitting, splitting.resolvent(1.0)
 

@@ -1,8 +1,8 @@
 """Starts of a contact solve, and further attempts after a failed one.
 
 A solve without a guess starts from coarser grids: the contact is solved loosely on the coarsest grid first, and each
-solution is the start on the next finer one. The coarse pressure is the same in all fine cells of a coarse one, so that
-no point far from contact gets pressure.
+solution is the start on the next finer grid. The coarse pressure is the same in all fine cells of a coarse cell, so
+that no point far from contact gets pressure.
 
 A dilute contact in a free box is solved on the tiles that may touch, so that the cost follows the contact, not the box.
 The contact on a coarser grid gives a pressure p on a grid of blocks, and p gives the displacement u there. A block can
@@ -10,16 +10,17 @@ touch only if
 
     u - max(h) - d < MARGIN L,
 
-with L the length by which u varies within the contact (`records.Certificate`). Tiles of 32 x 32 points with such
-blocks, with blocks under pressure, or with neighbours of these blocks are stacked to one map. There `ContactSolver`
-solves the same problem with operators on tiles (`physics.convolution`). These also give the displacement at all points
-of the grid, so that `ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the
-check fails, the operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves
-and sends the result to all ranks.
+with L the standard deviation of u in the contact (`records.Certificate`). A tile of 32 x 32 points is chosen if it
+contains a block that can touch or that is under pressure, or a neighbour of such a block. The chosen tiles are stacked
+to one map. On this map `ContactSolver` solves the same problem with operators on tiles (`physics.convolution`). These
+operators also give the displacement at all points of the grid, so that `ContactSolver.check` can check the pressure
+everywhere. For tolerances below FINEST, the least that operators on tiles can check, or if the check fails, the
+operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves on the tiles and
+sends the result to all ranks.
 
 A failed solve is repeated with an operator in double precision, from a cold start on nested grids, and by an active set
-(`solve_by_sets`). A solve that succeeds neither calls nor allocates anything for this. The attempts depend on the
-failed solve alone, so that all ranks make the same ones, and a repeated run repeats them.
+(`solve_by_sets`). A solve that succeeds does nothing for these attempts. The attempts depend on the failed solve alone,
+so that all ranks make the same attempts, and a repeated run repeats them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +51,8 @@ class Level:
 
 
 def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
-    """Return a grid with `heights` and all coarser grids, the finest first; collective."""
+    """Return the levels of a solve: the grid itself, with `heights`, and all coarser grids, the finest first;
+    collective."""
     levels = [Level(slab, heights)]
     while (coarse := regrid.coarser(levels[-1].slab)) is not None:
         levels.append(Level(coarse, regrid.restrict(levels[-1].slab, coarse, levels[-1].heights)))
@@ -58,7 +60,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """Object that belongs to a grid, given by its slab."""
+    """Anything with a `slab`, which `descend` needs of each of its levels."""
 
     @property
     def slab(self) -> Slab: ...
@@ -68,10 +70,11 @@ L = TypeVar("L", bound=OnGrid)
 
 
 def descend(levels: Sequence[L], solve: Callable[[L, Array], Array], start: Array) -> None:
-    """Put a start for the first, finest of `levels` into `start`; collective.
+    """Solve all `levels` but the finest, the coarsest first, and put a start for the finest level into `start`;
+    collective. `levels` begin with the finest.
 
-    Levels are solved from the coarsest up to the second: `solve(level, start)` returns the pressure on a level from
-    that start. The next level starts from this pressure, or from 0 if there is none or if it is not finite.
+    `solve(level, map)` returns the pressure on a level, solved from the start in `map`. The next finer level starts
+    from this pressure. A level starts from 0 if there is no coarser level or if the coarser pressure is not finite.
     """
     below: tuple[L, Array] | None = None
     for level in reversed(levels):
@@ -110,7 +113,8 @@ class Found:
 
 
 def is_block_grid(slab: Slab, finest: Slab) -> bool:
-    """Return True if a grid is coarse enough for blocks, each within one tile of the `finest` grid."""
+    """Return True if a grid is coarse enough to be a grid of blocks: its longer side has at most BLOCKS points, or at
+    most as many points as the longer side of the `finest` grid has tiles."""
     longest = max(slab.nx, slab.ny)
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
@@ -118,8 +122,12 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, box: Box
 ) -> Tiles | None:
-    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; None if no tile
-    may touch, or if the tiles hold more than LARGEST_SHARE of the points. Collective."""
+    """Return the tiles of a grid that may touch; None if no tile may touch, or if the tiles hold more than
+    LARGEST_SHARE of the points. Collective.
+
+    `slab` and `heights` belong to this grid, and `below` is the contact on the next coarser grid. `blocks` is the slab
+    of the grid of blocks, with the `operators` of the body on that grid. `box` bounds the pressure.
+    """
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = box.touches(p) != 0.0
@@ -183,10 +191,11 @@ class OnTheseTiles:
         return Found(slab, p, d, length)
 
     def check(self, solver: ContactSolver, p: Array) -> Contact | None:
-        """Return the contact of the solution p if it meets the solver's tolerance at all points of the grid, else None;
-        collective.
+        """Return the contact of the solution p if its certificate, over all points of the grid, meets the tolerance of
+        `solver`; else None. Collective.
 
-        For tolerances below FINEST the result is always None: p must be checked by the operator of the whole grid.
+        The displacement is computed by the operators on tiles. For tolerances below FINEST the result is therefore
+        always None: p must be checked by the operator of the whole grid.
         """
         if solver.tolerance < FINEST:
             return None
@@ -277,11 +286,13 @@ SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # makes a s
 def prepare_start(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> Contact | None:
-    """Put a start into the map `start`, which is 0, if the grid has at least WORTHWHILE points; collective.
+    """If the grid has at least WORTHWHILE points, replace `start`, a map of zeros, by a start from coarser grids;
+    collective.
 
-    Operator calls on other grids and on tiles are counted by their share of the points. With operators `on_tiles`, a
-    dilute contact is solved on tiles to the solver's tolerance, and returned if it meets the tolerance at all points;
-    otherwise the result is None. The constraint must then admit a pressure of 0.
+    `solver_on(slab, tolerance)` makes a solver and operators on a coarser grid. If `on_tiles` is given and the lower
+    bound of p is 0, a dilute contact is solved on tiles to the tolerance of `solver`. This contact is returned if it
+    meets the tolerance at all points; otherwise the result is None. An operator call on another grid or on tiles counts
+    as the number of points there divided by the number of points of the grid of `solver`.
     """
     if solver.slab.points < WORTHWHILE:
         return None
@@ -371,14 +382,15 @@ GAP_SHARE = 0.1  # tuning: largest gap on a set to which its linear problem is s
 
 
 def solve_by_sets(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
-    """Solve as `ContactSolver.solve` by a primal-dual active set, for a load that is not 0; collective.
+    """Solve the same problem as `ContactSolver.solve`, by a primal-dual active set, for a load that is not 0;
+    collective.
 
-    On a known set of points contact is the linear problem `A x = h + d`, with x at its bound elsewhere, solved by
-    preconditioned conjugate gradients. Then points where x is not admissible leave the set, and points whose gap
-    violates its condition enter the set (M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few
-    sets are usual, but sets may cycle. `ContactSolver.solve` is cheaper where it works, but slow where the
-    preconditioner is far from an inverse, as on cells much longer than wide: it changes its set in every step.
-    `iterations` of the contact counts iterations of the linear problems.
+    On a known set of points the contact is the linear problem `A x = h + d`, where x is at one of its bounds at all
+    other points. This problem is solved by preconditioned conjugate gradients. Then points where x is not admissible
+    leave the set, and points whose gap violates its condition enter the set (M. Hintermueller, K. Ito and K. Kunisch,
+    SIAM J. Optim. 13 (2003) 865). A few sets are usual, but sets may cycle. `ContactSolver.solve`, which changes its
+    set in every step, is cheaper where it works, but slow where the preconditioner is far from an inverse, as on cells
+    much longer than wide. `iterations` of the contact counts iterations of the linear problems.
     """
     search = _Search(solver, problem, start)
     contact, iterations = solver.check(problem, start, ""), 0
@@ -478,8 +490,9 @@ def retry_solve(
     attempts.
 
     `solver_on(slab, tolerance)` makes a solver and operators of the body on another grid. `in_double()` makes a solver
-    and operators in double precision, and is None if the problem already has them. `most` limits the number of
-    attempts. Each is counted as `retry`; `iterations` includes all attempts.
+    and operators in double precision; `in_double` is None if the problem already has them. `most` limits the number of
+    attempts. The tally counts each attempt as `retry`. `iterations` of the returned contact includes the failed solve
+    and all attempts.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
     for name, contact in islice(_attempts(solver, problem, failed, solver_on, in_double), most):
