@@ -21,13 +21,14 @@ class Lines:
     """Grid lines along the sliding direction, for a body that is stiffer for waves that vary along these lines.
 
     `axis` is the axis of maps, 0 or 1, along which the lines run. `contrast` c is the modulus of waves that vary along
-    the lines, divided by the modulus of waves that do not. An error of the gap that varies along the lines causes c
-    times the pressure that other errors cause. The length of the certificate is therefore multiplied by the factor s,
+    the lines, divided by the modulus of waves that do not. An error of the gap that varies along the lines causes a
+    pressure c times as large as other errors of the gap cause. The length of the certificate is therefore multiplied by
+    the factor s,
 
         s^2 = v + (1 - v)/c^2.
 
     Here v is the share of the variance of the displacement u that remains after the mean of each line is subtracted
-    from u. The variance is weighted by the pressure.
+    from u. The variance and the means are weighted by the pressure.
     """
 
     axis: int
@@ -76,11 +77,11 @@ class Iterate:
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
-        """Return the iterate at the approach d for which `<p - lower bound, g> = 0` over points below the upper bound,
-        to rounding.
+        """Return the iterate at the approach d for which `<p - lowest, g> = 0` over points below the upper bound, to
+        rounding. Here `lowest` is the lower bound.
 
-        If all pressures are at bounds, d is the midpoint of `between`. If all are at the same bound, d is such that
-        `<p, g> = 0` over all points. If p is 0 everywhere, d does not change.
+        If all pressures are at bounds, d is the midpoint of `between`. If all pressures are at the same bound, d is
+        such that `<p, g> = 0` over all points. If p is 0 everywhere, d does not change.
         """
         if self.between is not None:
             d = 0.5 * sum(self.between)

@@ -129,8 +129,7 @@ def step_products(working, u, h, d, u_old, z, t):
 
 @loop
 def turn(working, z, beta, mean, t):
-    """Replace the direction t by `z + beta t - mean` on the working set and by 0 elsewhere. `mean` is the number to
-    subtract."""
+    """Replace the direction t by `z + beta t - mean` on the working set and by 0 elsewhere."""
     for j in range(t.shape[0]):
         for i in range(t.shape[1]):
             t[j, i] = z[j, i] + beta * t[j, i] - mean if working[j, i] else 0.0

@@ -223,8 +223,8 @@ class FreeSteadySolver:
         self._projected = Projected(judge, operator, preconditioner, grids)
 
     def hold_all(self) -> "_Points":
-        """Allocate all maps that a solve may need, and return the solver by proximal points that holds the further
-        ones."""
+        """Allocate all maps that a solve may need, and return the solver by proximal points, which holds the maps that
+        projected steps do not need."""
         return _Points(self._judge, self._operator, self._preconditioner, self._grids)
 
     def solve(self, h: Array, mean: float, start: Array) -> Contact:

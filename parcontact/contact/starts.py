@@ -60,7 +60,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """Anything with a `slab`, which `descend` needs of each of its levels."""
+    """Anything with a `slab`. `descend` needs the slab of each level."""
 
     @property
     def slab(self) -> Slab: ...
