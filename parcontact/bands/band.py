@@ -1,19 +1,19 @@
 """A band of the spectrum on its own grid, and its ladder: the mean pressures at which the band is solved.
 
 Each pressure p_j of a ladder is a rung. A result f(p) of a band is known at the rungs. Between them f(p)/p is the cubic
-in log p through the four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`; below the first and above the last rung
-it is constant. A distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
+in log p through the four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`. Below the first and above the last rung
+f(p)/p is constant. A distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
 
     int P(p) f(p) dp = sum_j W_j f(p_j),    sum_j W_j p_j = int P(p) p dp:
 
-the load is conserved. Functions linear in p would conserve the load, too, but underestimate a concave f.
+the load is conserved. With psi_j linear in p the load would be conserved, too, but a concave f be underestimated.
 
 In a history each stage of the job becomes stages whose steps follow the cell and the waves of the band. After a change
-of velocity the steps of a slide grow from a small part of a cell to half a cell. Then each has exactly half a cell, so
-that solves start from the pressures of the step before the last, moved by a cell (`march.laws`). After a slip of
-SETTLED times the longest wave a band slides steadily, and makes no steps until the next stage: fine bands settle within
-micrometres. So a band's own history is shorter than the job's, and a step is placed by the number of the job's stage
-and by the time since this stage began.
+of velocity the steps of a slide grow from a small part of a cell to half a cell. Each later step is a slip of
+exactly half a cell, so that its solve starts from the pressures of two steps before, moved by a cell (`march.laws`).
+After a slip of SETTLED times its longest wave a band counts as steady, and makes no steps until the next stage: fine
+bands settle within micrometres. So a band's own history is shorter than the job's, and a step is placed by the number
+of the job's stage and by the time since this stage began.
 """
 
 from __future__ import annotations
@@ -63,8 +63,9 @@ class PressureLadder:
 
     @classmethod
     def over(cls, mean: float, rms: float) -> PressureLadder:
-        """Return the ladder for pressures with this mean and rms deviation in full contact [Pa], equally spaced in the
-        logarithm; a single rung if the deviation is 0."""
+        """Return the ladder of a band, for the mean pressure and the rms deviation [Pa] that coarser bands give in full
+        contact. The rungs are equally spaced in the logarithm, up to ABOVE deviations over the mean pressure. Without a
+        deviation the mean pressure is the only rung."""
         if not rms > 0.0:
             return cls(np.array([mean]))
         top = mean + ABOVE * rms
@@ -98,12 +99,13 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Rung:
-    """Steady state of one band under a mean `pressure` [Pa] of its ladder.
+    """Results of one band under a mean `pressure` [Pa] of its ladder: a steady state, or a track over time, whose
+    numbers are arrays (`road_history.track_of`).
 
-    Friction [-] of the band's waves, from the dissipated power and by slopes; area as a share, counted and corrected;
-    approach [m] (in `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the ladder of the next
-    finer band, and the share of the load above this ladder; power [W/m^2] lost in each branch; arrays that effects
-    `found` (`Probe`), by name; relative errors of friction and area by solver and grid; residual; operator calls.
+    `friction` [-] of the band's waves follows from the dissipated power, and `friction_slopes` from the pressures on
+    slopes. Contact areas are shares of the nominal area. `Cascade.climb` adds the approach of finer bands to the
+    `approach` [m]. `weights` are those of the ladder of the next finer band, and `load_lost` is the share of the load
+    above this ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects by name (`Probe`).
     """
 
     pressure: float
@@ -127,10 +129,9 @@ Means = Mapping[str, Callable[[Any], Array]]  # weights of rungs in the mean of 
 
 
 class Probe(Protocol):
-    """Measures of an effect in each contact of a band. All methods are local.
+    """Part of an effect that measures arrays in each contact of a band. All methods are local.
 
-    The function `probes(job, cut)` in the module `bands` of an effect yields them for the bands of a job
-    (`choice.Cut`).
+    The function `probes(job, cut)` in the module `bands` of an effect yields its probes for the bands `cut` of a job.
     """
 
     means: ClassVar[Means]
@@ -143,12 +144,12 @@ class Probe(Protocol):
 
 
 def probes_of(job: Job, cut: Cut) -> list[Probe]:
-    """Return new measures of all effects of a job."""
+    """Return new probes of all effects of a job."""
     return [probe for made in answers("bands", "probes") for probe in made(job, cut)]
 
 
 class Band:
-    """A surface with the waves of one band, and its contacts, on this rank alone.
+    """A surface with the waves of one band, on this rank alone. Methods solve contacts of the surface.
 
     `number` counts bands from the coarsest; each `sample` is another surface with the same spectrum. All waves have
     the amplitude of the spectrum, so that surfaces differ in their phases only.
@@ -203,7 +204,7 @@ class Band:
         return self._full * self.setup.units.pressure
 
     def contact(self, pressure: float, law: Constraint) -> Contact:
-        """Return the contact in steady sliding under a mean pressure [Pa], with the `law` of `solve`."""
+        """Return the contact in steady sliding under a mean pressure [Pa], with the `law` of the interface."""
         setup, units = self.setup, self.setup.units
         judge = Judge(setup.slab, setup.height / units.height)
         tolerance = tolerance_of(setup.choices.numerics.tolerance)
@@ -215,9 +216,9 @@ class Band:
         return contact
 
     def solve(self, pressure: float, law: Constraint, below: PressureLadder | None) -> Rung:
-        """Return the steady state under a mean pressure [Pa] and its distribution over `below`, the ladder of the next
-        finer band. `law` is the closing of all finer bands, a length [m] as a function of the pressure [Pa]. Raises
-        RunError if no state is found."""
+        """Return the steady state under a mean pressure [Pa], with the distribution of the contact's pressures over
+        `below`, the ladder of the next finer band. `law` has the length [m] by which a pressure [Pa] closes the gap
+        that all finer bands leave. Raises RunError if no state is found."""
         setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
         units = setup.units
         seen = contact.u, self.heights, contact.d, law.touches(contact.p)
@@ -247,7 +248,8 @@ class Band:
 
 
 def rung_errors(budget: ErrorBudget | None) -> Array:
-    """Return the relative errors of friction and area by solver and grid, from the error budget of a contact."""
+    """Return the relative errors of friction by solver, time steps and grid, and then those of area, shape (6,), from
+    the error budget of a contact."""
     both = (budget.friction, budget.area) if budget else (None, None)
     return np.array([(p.solver + p.folded, p.time, p.mesh) if p else (0.0, 0.0, 0.0) for p in both]).ravel()
 
@@ -302,8 +304,8 @@ class Place(NamedTuple):
 
 
 def parts_of_history(job: Job, grid: Grid, longest: float) -> list[tuple[Stage, int]]:
-    """Return the stages of a band with this grid and `longest` wave [m], each with the number of its stage in the
-    job."""
+    """Return the stages into which the stages of the job are divided for a band with this grid and `longest` wave [m],
+    each with the number of the job's stage of which it is a part."""
     found = list[tuple[Stage, int]]()
     for number, stage in enumerate(job.history):
         found += [(part, number) for part in _parts(job, stage, grid.dx, longest)]
@@ -356,9 +358,10 @@ class BandClock:
         return Place(number, step.time - self._starts[number])
 
     def between(self, at: Place) -> tuple[int, int, float]:
-        """Return the numbers of the steps before and after a place, and the share of the step after.
+        """Return the numbers of the steps before and after a place, and the weight of the step after in results that
+        are interpolated between the two steps.
 
-        Results vary linearly with the slip of a slide, and with the logarithm of the time of a rest. Beyond the last
+        The interpolation is linear in the slip of a slide, and in the logarithm of the time of a rest. Beyond the last
         step of a stage results are constant; before the first step they are the last results of the stage before.
         """
         own = [index for index, place in enumerate(self.places) if place.stage == at.stage]

@@ -1,4 +1,4 @@
-"""Plan of a job in bands: its steps and costs, from a trial of its finest band."""
+"""Plan of a job in bands: the numbers of its contacts or marches, and their time, which a short trial measures."""
 
 import time
 from collections.abc import Iterator

@@ -1,21 +1,21 @@
-"""The upward and the downward pass over all bands, and the stored contacts.
+"""Bands are coupled by an upward and a downward pass over all bands. Solved contacts are stored.
 
-Upward, from the finest band to the coarsest, each band is solved at the pressures of its ladder, with the closing of
-all finer bands as the law of its interface; its approach as a function of the pressure is the law of the next coarser
-band. Downward the distribution of pressure passes through the bands,
+In the upward pass, from the finest band to the coarsest, each band is solved at the pressures of its ladder, with the
+closing of all finer bands as the law of its interface. The approach of a band as a function of the pressure is the law
+of the next coarser band. In the downward pass the distribution of pressure passes through the bands,
 
     P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) w_j(p) dp,
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
 
 with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure within
-it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks solve different ones.
+it, and the weights w_j of `ladder`. Contacts of one band are independent, so that ranks share them.
 
-Contacts of the present point of a friction curve are stored in a file, so that a killed run continues within this
-point.
+Contacts of the present point of a friction curve are stored in a file. A run that was killed and is continued solves
+only the missing contacts of this point.
 
-The first line of the file names the program. Any other line has a digest of all input of a contact, and the numbers of
-the contact, which are read back exactly, so that repeated passes find the same states without a solve. An incomplete
-line is ignored. Marches of `road_history` are stored in the same way.
+The first line of the file names the program. Each other line is of one contact: a digest of all its input, and its
+numbers. Numbers are read back exactly, so that repeated passes find the same states without a solve. An incomplete line
+is ignored. Marches of `road_history` are stored in the same way.
 """
 
 import hashlib
@@ -50,14 +50,16 @@ class ContactStore:
         self._known: dict[str, Rung] = {}
 
     def keep_in(self, directory: Path, job: Job, name: str = NAME) -> str:
-        """Read the contacts in a file of this directory, and store further ones there. Return, on root, a sentence on a
-        file of another program, which is removed, or ''. Raises RunError if that fails."""
+        """Read the contacts in a file of this directory, and store further ones there. Remove a file of another
+        program, and return a sentence on this on root, otherwise ''. Raises RunError if the file cannot be read or
+        written."""
         self._path = directory / name
         return self._on_root(lambda: self._read(job)) or ""
 
     def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:
-        """Return the contacts with the given `states`, plain data that identify a contact of the job. `solve` gets the
-        indices of states that are not stored, and returns their contacts. Raises RunError if writing fails."""
+        """Return one contact for each of `states`. A state is plain data that identify a contact of the job. `solve`
+        takes the indices of the states whose contacts are not stored, and returns these contacts. Raises RunError if
+        writing fails."""
         digests = [hashlib.sha256(repr((self._job, state)).encode()).hexdigest() for state in states]
         known = self._slab.agree([self._known.get(digest) for digest in digests])
         lacking = [number for number, rung in enumerate(known) if rung is None]
@@ -70,7 +72,7 @@ class ContactStore:
         return [rung or solved[number] for number, rung in enumerate(known)]
 
     def clear(self) -> None:
-        """Remove all contacts, as their point has been written."""
+        """Remove all contacts. The caller has written the point of the curve to which they belong."""
         self._known = {}
         if self._path.name:
             self._on_root(lambda: self._path.unlink(missing_ok=True))
@@ -124,8 +126,7 @@ NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved
 
 
 class Task(NamedTuple):
-    """One contact to solve: numbers of band, sample and rung (pressure of the ladder), and the closing of finer
-    bands."""
+    """One contact to solve. `band`, `sample` and `rung` are numbers from 0, and `law` is the closing of finer bands."""
 
     band: int
     sample: int
@@ -137,10 +138,12 @@ class Task(NamedTuple):
 class BandResult:
     """Result of one band under a distribution of pressure.
 
-    Weights of the ladder and load [Pa]; friction force of the band's waves divided by the whole load [-], from the
-    dissipated power and by slopes; area at the band's shortest wave, counted and corrected; share of the load above the
-    ladder; power [W/m^2] per branch; arrays that effects `found`, averaged over the ladder (`band.Probe`); absolute
-    errors of friction and of area by solver, time steps and grid.
+    `weights` are the weights W_j of the rungs, and `load` is the sum of W_j p_j [Pa]. `friction` is the force of the
+    band's waves over the whole load, from the dissipated power, and `friction_slopes` the same from the pressures on
+    slopes. Contact areas are shares of the nominal area, resolved down to the band's shortest wave. `load_lost` is the
+    share of the load above the ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
+    (`band.Probe`), averaged over the ladder. `errors`, shape (6,), are the absolute errors of friction by solver, time
+    steps and grid, and then those of area.
     """
 
     weights: Array
@@ -156,8 +159,8 @@ class BandResult:
 
 
 class Shares(NamedTuple):
-    """A ladder under a distribution of pressure: `pressures` and `loads` of its rungs [Pa], the `mean` pressure of the
-    road [Pa], and the `power` of each rung, up to a common factor."""
+    """Shares of the rungs of a ladder in a distribution of pressure. Rung j has the pressure p_j [Pa], the load W_j p_j
+    [Pa] per nominal area, and a power in arbitrary units. `mean` is the mean pressure of the road [Pa]."""
 
     pressures: Array
     loads: Array
@@ -166,18 +169,17 @@ class Shares(NamedTuple):
 
 
 def by_load(shares: Shares) -> Array:
-    """Return the weights of the pressures of a ladder in a mean weighted by load."""
+    """Return the weight of each rung: its share of the load."""
     return shares.loads / shares.loads.sum()
 
 
 def by_square(shares: Shares) -> Array:
-    """Return the weights of ladder pressures in a mean over load times pressure, divided by the mean pressure
-    squared."""
+    """Return the weight of each rung: its load times its pressure, over the square of the road's mean pressure."""
     return shares.loads * shares.pressures / shares.mean**2
 
 
 def by_power(shares: Shares) -> Array:
-    """Return the weights of the pressures of a ladder in a mean weighted by power; 0 without power."""
+    """Return the weight of each rung: its share of the power; 0 if no rung has power."""
     weights = np.maximum(shares.power, 0.0)
     return np.asarray(weights / max(float(weights.sum()), TINY))
 
@@ -187,9 +189,10 @@ Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
 
 
 class Cascade:
-    """All bands of a job on the ranks of `slab`, whose grid points are not used; methods are collective.
+    """All bands of a job. Methods are collective.
 
-    Contacts in its `store` are not solved again.
+    The ranks of `slab` share the contacts. The grid of `slab` is not used. Contacts in the `store` are not solved
+    again.
     """
 
     def __init__(self, job: Job, cut: Cut, slab: Slab) -> None:
@@ -223,7 +226,7 @@ class Cascade:
         self._temperatures = list(temperatures)
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each band to `at(value)` with the band's value."""
+        """Set the factors of the moduli of each wave of a band to `at(values[band])`."""
         self._factors = at, list(values)
         for (number, _), band in self._bands.items():
             band.set_factors(at(values[number]))
@@ -236,7 +239,7 @@ class Cascade:
 
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
         """Make the upward pass, separately for each sample: solve all bands at all pressures of their ladders, with the
-        laws of finer bands. Return the rungs by band and sample."""
+        closing of finer bands. Return the rungs of each (band, sample)."""
         found: dict[tuple[int, int], list[Rung]] = {}
         laws: dict[int, Constraint] = dict.fromkeys(samples, Box())
         touching = dict.fromkeys(samples, 0.0)
@@ -255,13 +258,15 @@ class Cascade:
 
     def closing_of(self, number: int, approaches: Sequence[float] | Array) -> tuple[InterfaceLaw, float]:
         """Return the closing c(p) of a band and all finer bands, from the approaches [m] of the band's rungs, and the
-        approach where c is 0. Approaches are first made to rise: only the residual of the solver lets them fall."""
+        approach where c is 0. An approach below that of a lower pressure, which the solver's residual causes, is raised
+        to it first."""
         closings = np.maximum.accumulate(approaches)
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
 
     def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
-        """Make the downward pass: distribute the load over the bands, whose rungs `solve(band, weights)` returns."""
+        """Make the downward pass: distribute the load over the rungs of each band, and return the results of all bands.
+        `solve(band, weights)` returns the rungs of a band whose ladder has these weights."""
         weights, found, lost = np.ones(1), list[BandResult](), 0.0
         for number, ladder in enumerate(self.ladders):
             rungs = solve(number, weights)
@@ -293,7 +298,7 @@ class Cascade:
         )
 
     def hard(self, sample: int) -> Results:
-        """Return the results on hard walls: each band alone, without the laws of finer bands."""
+        """Return the results of all bands of a sample if no band has the closing of finer bands (`Box`)."""
 
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]
@@ -308,14 +313,16 @@ class Cascade:
         return self.fall(solve)
 
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
-        """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if a solve fails."""
+        """Return the contacts of the tasks in their order, from the store or else solved and then stored.
+        Raises RunError on all ranks if a solve fails."""
         laws = [tuple(np.asarray(value).tobytes() for value in vars(task.law).values()) for task in tasks]
         here = self.velocity, self.pressure, self._temperatures, self._factors and self._factors[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
         return self.store.find(states, lambda lacking: self.share([tasks[number] for number in lacking], self._solve))
 
     def share(self, tasks: Sequence[T], solve: Callable[[T], Rung]) -> list[Rung]:
-        """Solve tasks, each on one rank, and return all results. Raises RunError on all ranks if one fails."""
+        """Solve each task on one rank, without the store, and return the results of all tasks in their order. Raises
+        RunError on all ranks if a solve fails."""
         rank, size = self.slab.comm.rank, self.slab.comm.size
         own: list[Rung | None] = []
         problem = ""

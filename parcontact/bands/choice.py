@@ -1,16 +1,14 @@
 """Choice of the bands of a job, from its spectrum or measured map: numbers of bands, boxes, points and surfaces.
 
-The spectrum of a job's surface is one function, with moments of its waves between two wavenumbers.
+The spectrum Phi(k) of a job is the sum of the isotropic spectra of its rough shapes. The mean square height and slope
+of the waves between two wavenumbers are
 
-An isotropic spectrum Phi(k) has, between two wavenumbers,
+    <h^2> = int Phi k dk/(2 pi),    <|grad h|^2> = int Phi k^3 dk/(2 pi).
 
-    <h^2> = int Phi k dk/(2 pi),    <|grad h|^2> = int Phi k^3 dk/(2 pi);
+If the surfaces are profiles, the integrals have one factor k less.
 
-on a line of points the integrals have one factor k less. Spectra of several rough shapes are added.
-
-If the surface starts with a measured map, the coarsest band is the map itself, without finer waves.
-
-A real road is not Gaussian, so that a spectrum alone does not describe its long waves.
+A surface from a spectrum is Gaussian, and the long waves of a real road are not. A measured map describes them: if the
+surface of a job starts with a map, the coarsest band is the map itself, without finer waves.
 """
 
 import math
@@ -39,10 +37,10 @@ POINTS = 4000  # accuracy: points of the midpoint rule over ln k; its error is 1
 
 @dataclass(frozen=True)
 class WaveSpectrum:
-    """Spectrum Phi [m^4] of a surface as a function of wavenumbers [rad/m], for wavelengths `longest` to `shortest`
-    [m].
+    """Spectrum Phi of a surface as a function of wavenumbers [rad/m], for wavelengths from `longest` to `shortest` [m].
 
-    If `line` is True, the surface is a profile along the sliding. Phi is smooth except at the `kinks` [rad/m].
+    Phi is in m^4. If `line` is True, the surface is a profile along the sliding, and Phi is in m^3. Phi is smooth
+    except at the `kinks` [rad/m].
     """
 
     phi: Callable[[Array], Array]
@@ -64,8 +62,10 @@ class WaveSpectrum:
         return float(np.sum(self.phi(k) * k ** (power + 2 - self.line)) * step / (2.0 * np.pi))
 
     def density_of_slopes(self, k: Array, low: float, high: float) -> Array:
-        """Return the mean square slope per area of the plane of wavenumbers, divided by 4 pi^2, or on a line per
-        length, divided by 2 pi; 0 outside of the two wavenumbers."""
+        """Return Phi k^2 for wavenumbers k [rad/m], or 0 outside of `low` to `high`.
+
+        The integral over the plane of wavenumbers is 4 pi^2 times the mean square slope. For profiles the integral
+        over positive k is 2 pi times the mean square slope."""
         inside = (k >= low) & (k < high)
         known = np.where(inside, k, low)
         return np.where(inside, self.phi(known) * known**2, 0.0)
@@ -75,8 +75,8 @@ class WaveSpectrum:
         return np.geomspace(*self.ends, count + 1)
 
     def steep_beyond(self, slope: float) -> float:
-        """Return the wavelength [m] above which all waves together have this rms slope; 0 if all waves together have
-        less."""
+        """Return the wavelength [m] such that the longer waves together have this rms slope; 0 if the whole spectrum
+        has less."""
         edges = self.cut(POINTS)
         middle, step = np.sqrt(edges[1:] * edges[:-1]), np.log(edges[1] / edges[0])
         squares = np.cumsum(self.phi(middle) * middle ** (4 - self.line)) * step / (2.0 * np.pi)
@@ -145,7 +145,8 @@ WARN_STEEP_WAVES = Kind(
 
 
 def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
-    """Yield a warning if the surface is too steep for linear theory, with the usual cut-off of the spectrum."""
+    """Yield a warning if the rms slope is above STEEP, where linear theory fails. If the rms slope is above USUAL, too,
+    the warning names the wavelength at which such a spectrum is usually cut off."""
     slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
     if slope <= STEEP:
         return
@@ -163,8 +164,10 @@ RESOLVED = 8  # accuracy: points of a map per wave that it resolves
 
 @dataclass(frozen=True)
 class MapBand:
-    """The coarsest band if it is a measured map: heights [m] on its `grid`, shape (ny, nx), rms slope, notes on its
-    preparation, and warnings."""
+    """The coarsest band if it is a measured map.
+
+    `heights` [m] on the `grid` have the shape (ny, nx). `notes` are sentences on the preparation of the map, and
+    `doubts` are warnings about the map."""
 
     grid: Grid
     heights: Array
@@ -216,9 +219,10 @@ SAMPLE_SHARE = 0.3  # accuracy: share of the scatter of surfaces in the requeste
 class Cut:
     """The bands of a job as they are solved.
 
-    `edges` are the wavenumbers between bands [rad/m]; each band has `points` along x and y, and `waves` longest waves
-    along its box; `samples` is the number of surfaces per band, 0 for as many as the accuracy needs. A `measured` map
-    is the coarsest band, and `spectrum` is the spectrum of all other bands.
+    `edges` [rad/m] are the wavenumbers at the ends of the bands, shape (bands + 1,). Each band has a grid of `points`
+    along x and y, whose side is `waves` times the band's longest wavelength. `samples` is the number of surfaces per
+    band, 0 for as many as the accuracy needs. A `measured` map is the coarsest band, and `spectrum` is the spectrum of
+    all other bands.
     """
 
     spectrum: WaveSpectrum
@@ -259,7 +263,7 @@ class Cut:
         return math.sqrt(square + self.spectrum.moment(float(self.edges[int(of_map)]), float(self.edges[-1]), 0))
 
     def rms_slope(self, band: int, first: int | None = None) -> float:
-        """Return the rms slope of a band, or of all bands from `first` to this band."""
+        """Return the rms slope of the waves of a band, or of all bands with the numbers from `first` to `band`."""
         start = band if first is None else first
         of_map = self.measured is not None and start == 0
         square = self.measured.rms_slope**2 if self.measured and of_map else 0.0
@@ -322,7 +326,8 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
 
 
 def on_one_grid_of_all(job: Job, cut: Cut) -> Job:
-    """Return the job with one grid for all its waves instead of bands, to find the frequencies that they excite."""
+    """Return the job with one grid that resolves the waves of all bands. The grid is for the range of frequencies that
+    the waves excite, and not for a solve."""
     side = cut.wavelengths(0)[0]
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     return job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})

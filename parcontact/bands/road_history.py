@@ -2,12 +2,13 @@
 
 Every band is marched through the whole history at every rung of its ladder, from the finest band to the coarsest, with
 the closing of all finer bands at each instant as the law of its interface (`BandMarch`). Then the load is distributed
-over the bands at each instant as in steady sliding (`cascade`, `road_sliding`), with errors of the same kind: half of
-the rungs are marched on hard walls, too, for the error of the method.
+over the bands at each instant as in steady sliding (`cascade`, `road_sliding`). For the error of the method, half of
+the rungs are marched without the closing of finer bands, too.
 
 The nominal pressure is constant, and rungs keep their pressures. But the mean pressure on a fine band rises when the
-rubber stiffens, as smaller contacts carry the load. The rungs then remember contact under a pressure that the rubber
-did not have before. This is a part of the error of the method (`RoadHistory._error_by_memory`).
+rubber stiffens, as smaller contacts carry the load. A rung of higher pressure then has a larger weight. It was
+marched under this pressure from the start, when the pressure on the rubber was lower, so that it has a wrong memory of
+the start. This error is a part of the error of the method (`RoadHistory._error_by_memory`).
 """
 
 import copy
@@ -45,8 +46,10 @@ NONE: Array = np.zeros(1)  # of what only steady states have
 
 
 class BandMarch:
-    """Marches of one band: calculations step by step through its history. A march gives a `Rung`, whose numbers have a
-    first axis over the places of `clock`: the track under this pressure. Its friction is along +x, by slopes."""
+    """Marches of one band: calculations step by step through the history of the band.
+
+    Each march is under a constant mean pressure. Its result is a track: a `Rung` whose numbers are arrays with a first
+    axis over `BandClock.places`. The friction of a track is along +x, from the pressures on slopes."""
 
     def __init__(self, band: Band) -> None:
         self.band = band
@@ -118,7 +121,8 @@ EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decide
 
 
 class RungTask(NamedTuple):
-    """One march to make: numbers of band, sample and rung (pressure of the ladder); `hard` without finer bands."""
+    """One march to make. `band`, `sample` and `rung` are numbers from 0. A `hard` march has no closing of finer
+    bands."""
 
     band: int
     sample: int
@@ -137,7 +141,8 @@ class Instant(NamedTuple):
 
 
 class ClosingOverTime:
-    """Closing of a band and all finer bands at each instant, from the approaches of the band, shape (rungs, places)."""
+    """Closing of a band and all finer bands at each instant, from the band's `approaches` [m], shape (rungs, places of
+    `clock`), and from the closing of the `finer` bands."""
 
     def __init__(
         self, cascade: Cascade, number: int, clock: BandClock, approaches: Array, finer: "ClosingOverTime | None"
@@ -164,7 +169,8 @@ After = Callable[[RungTask, int, int], None]
 
 
 class RoadHistory(RoadSliding):
-    """Calculation of the history of a job in bands on the ranks of `slab`; constructor and methods are collective."""
+    """Calculation of the history of a job in bands. The ranks of `slab` share the marches. The constructor and the
+    methods are collective."""
 
     def __init__(self, job: Job, slab: Slab) -> None:
         super().__init__(job, slab)
@@ -188,7 +194,8 @@ class RoadHistory(RoadSliding):
         self._cell = bands[-1].setup.grid.dx
 
     def notes(self) -> list[str]:
-        """Return sentences on the chosen bands, and on branches that are not relaxed at the end of a slide."""
+        """Return sentences on the chosen bands, and on branches so slow that they remember what was before a slide when
+        the march of the slide ends."""
         longest, slowest = self.cut.wavelengths(0)[0], max(relaxation_of(self.job.material)[2], default=0.0)
         cut_short = [stage.speed for stage in self.job.history if stage.seconds * stage.speed > SETTLED * longest]
         left = SETTLED * longest / max(cut_short, default=math.inf)
@@ -200,12 +207,13 @@ class RoadHistory(RoadSliding):
         return [*super().notes(), *([said] if 0.0 < left < slowest else []), *([] if self.loses else [elastic])]
 
     def keep_in(self, directory: Path) -> str:
-        """Store marches in a file of this directory until `forget` is called; return a sentence on a file of another
-        program, or ''. Raises RunError."""
+        """Store marches in a file of this directory until `forget` is called. Return, on root, a sentence on a removed
+        file of another program, or ''. Raises RunError if the file cannot be read or written."""
         return self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
-        """Return all calculations (marches) of each band, from the finest to the coarsest, with hard walls last."""
+        """Return the marches of each band, from the finest band to the coarsest. The `hard` marches of a band are the
+        last."""
         found = list[list[RungTask]]()
         for number in reversed(range(self.cut.count)):
             count, half = (len(each.ladders[number].rungs) for each in (self._cascade, self._hard))
@@ -219,7 +227,7 @@ class RoadHistory(RoadSliding):
         return [len(clock.places) for clock in self._clocks]
 
     def track(self, band: int, sample: int) -> list[Rung]:
-        """Return the results over time of a band at all pressures of its ladder."""
+        """Return the track of a band at each pressure of its ladder."""
         return self._tracks[band, sample]
 
     def try_march(self) -> None:
@@ -229,10 +237,11 @@ class RoadHistory(RoadSliding):
         self._march_alone(dict.fromkeys(self.samples), RungTask(last, 0, middle, True))
 
     def march(self, after: After) -> None:
-        """March all bands. After each round `after` is called, which is collective, with the last march and the numbers
-        of marches made and already stored; it may raise an error to stop.
+        """March all bands in rounds of one march per rank.
 
-        Marches in the store of contacts (`keep_in`) are not made again.
+        After each round all ranks call `after(task, count, stored)` with the last task of the round, the number of its
+        marches, and how many of them were in the store (`keep_in`) and not made again. `after` may raise an error to
+        stop.
         """
         laws: Closings = dict.fromkeys(self.samples)
         walls = list[list[Rung]]()
@@ -303,7 +312,7 @@ class RoadHistory(RoadSliding):
             start, slid = start + stage.seconds, slid + stage.seconds * abs(velocity)
 
     def records(self) -> Iterator[tuple[StepRow, list[list[float]]]]:
-        """Yield, after `march`, the row of measures.csv and the rows of bands.csv for each instant."""
+        """Yield the row of measures.csv and the rows of bands.csv for each instant. `march` must have been called."""
         way, virgin = 1.0, self.job.initial.state == "virgin"
         if virgin:
             yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan)), []
@@ -344,7 +353,7 @@ class RoadHistory(RoadSliding):
         return {key: [instant_of(track, *at[key[0]], way) for track in tracks] for key, tracks in self._tracks.items()}
 
     def _error_by_memory(self, stage: int, outcome: BandOutcome, way: float) -> float:
-        """Return the error of friction by the pressures that rungs keep, to first order.
+        """Return the error of friction because rungs keep their pressures through the history, to first order.
 
         The difference of the friction of a band from its value at the end of the stage is memory of the start, when the
         band had another mean pressure. All friction of a band that does not settle may be memory.

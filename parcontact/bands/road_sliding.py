@@ -40,10 +40,11 @@ SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 class BandOutcome:
     """Results of all bands.
 
-    `results` are the mean results of all samples, with the laws of finer bands. `with_laws` has friction and corrected
-    area of the first sample with these laws, `hard` the same without them. `scatter` has the standard errors of
-    friction and area between surfaces, `rungs` the rungs of each band. `line` is True if the surfaces are profiles.
-    `memory` is the error of friction in a history because rungs remember pressures that the rubber did not have."""
+    `results` are the mean results of all samples, with the closing of finer bands. `with_laws` has friction and
+    corrected area of the first sample with this closing, and `hard` has both without it. `scatter` has the standard
+    errors of friction and area, from the differences between surfaces. `rungs` has the rungs of each band, averaged
+    over samples. `line` is True if the surfaces are profiles. `memory` is the error of friction because rungs keep
+    their pressures through a history."""
 
     results: Results
     with_laws: tuple[float, float]
@@ -59,8 +60,11 @@ class BandOutcome:
 
     @property
     def method(self) -> list[float]:
-        """Errors of the method in friction and in the corrected area: a share of the difference between results with
-        and without laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; 0 for one band."""
+        """Absolute errors of the method in friction and in the corrected area; 0 if there is only one band.
+
+        Each is a share of the difference between the results with and without the closing of finer bands. The least
+        relative error is LEAST_METHOD, which falls to 0 near full contact. For the area it is at least LEAST_OF_AREA
+        times the open share of the area. `memory` is added to the error of friction."""
         if len(self.results) == 1:
             return [0.0, 0.0]
         open_share = 1.0 - self.results[-1].contact_area_corrected
@@ -74,8 +78,8 @@ class BandOutcome:
 class BandLoop(Protocol):
     """Loop of rounds by which an effect changes bands and finds its results. Its methods are collective.
 
-    The function `loops(job, cut)` in the module `bands` of an effect yields its loops. All loops that `move` share the
-    rounds of one fixed point.
+    The function `loops(job, cut)` in the module `bands` of an effect yields its loops. Loops that change the bands
+    have `moves` = True and share the rounds of one fixed point.
     """
 
     moves: bool  # False if the effect only finds something in a state
@@ -89,7 +93,7 @@ class BandLoop(Protocol):
 
     def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
         """Return True if the next round would change nothing for the effect. `changes` are the relative changes of
-        friction and area in the round; `others` is True if all loops before this one have settled."""
+        friction and area in the round; `others` is True if all loops that come earlier in the round settle."""
 
     def move(self, road: "RoadSliding", results: Results) -> None:
         """Choose what the effect changes in the next round; raises RunError."""
@@ -130,8 +134,8 @@ class RoadSliding:
         return describe_cut(self.cut, self.job)
 
     def keep_in(self, directory: Path) -> str:
-        """Store contacts in a file of this directory until their point of the curve is written. Return a sentence on a
-        file of another program, or ''. Raises RunError."""
+        """Store contacts in a file of this directory until their point of the curve is written. Return, on root, a
+        sentence on a removed file of another program, or ''. Raises RunError if the file cannot be read or written."""
         return self._cascade.store.keep_in(directory, self.job)
 
     def forget(self) -> None:
@@ -228,7 +232,7 @@ class RoadSliding:
         return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each band to `at(value)` with the band's value."""
+        """Set the factors of the moduli of each wave of a band to `at(values[band])`."""
         self._cascade.set_factors(at, values)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
@@ -237,7 +241,8 @@ class RoadSliding:
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperatures[-1])))
 
     def rub(self, results: Results) -> float:
-        """Return the shear stress [Pa] of the interface, averaged over the nominal area."""
+        """Return the magnitude of the shear stress [Pa] of the interface over the nominal area, for the contact area in
+        `results` and the present velocity."""
         area, shears = results[-1].contact_area_corrected, self.setup.choices.shears
         forces = [shear.force(area, self._cascade.velocity) for shear in shears]
         return math.hypot(*(sum(force[axis] for force in forces) for axis in (0, 1)))
@@ -335,12 +340,14 @@ class RoadSliding:
 
     @property
     def loses(self) -> bool:
-        """True for a material with losses; without losses, friction of the waves is only a mesh error."""
+        """True if the material has branches. Without branches the waves cause no friction, and what is calculated as
+        their friction is an error of the mesh."""
         return len(relaxation_of(self.job.material)[2]) > 0
 
 
 def make_states(job: Job, slab: Slab) -> States:
-    """Return the solver of the steady states of a job, in bands or on one grid; collective."""
+    """Return the solver of the steady states of a job: in bands if the job has `bands`, otherwise on one grid.
+    Collective."""
     return on_one_grid(job, slab) if job.bands is None else RoadSliding(job, slab)
 
 
