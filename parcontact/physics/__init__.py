@@ -1,1 +1,2 @@
-"""The physics of the contact. No module here uses a communicator."""
+"""The physics of the contact. Modules here do not call MPI: collective functions communicate by the slab and the
+transform."""

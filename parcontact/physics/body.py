@@ -1,7 +1,7 @@
 """The body, elastic or with relaxing branches, and its memory.
 
-With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shear modulus 1, the total pressure
-satisfies
+With the relaxation function `G(t) = G_inf + sum_k G_k exp(-t/tau_k)`, the elastic operator A of shear modulus 1, and
+the displacement u of the surface, the total pressure p satisfies
 
     A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     h_k the part of branch k [Pa m].
 
@@ -17,19 +17,19 @@ The first rule is exact for u quadratic in time through the last two values and 
     u(s) = u + s du + s (s - 1) kappa/2 (du - r du_before),   kappa = 2 r/(1 + r),   0 <= s <= 1,
     q(z) = (1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2.
 
-After a jump and in the first step of a stage, kappa is 0. The second rule is exact for u linear in time. The third is
-equivalent to Eqs. (7)-(9) of the paper. With `alpha = G_inf + sum gain_k` and `r = sum decay_k h_k - (sum gain_k) u +
-(sum back_k) du_before`, it follows that `A p = alpha u_new + r`: a step is a contact problem of an elastic body of
-modulus alpha with the effective heights `h + r/alpha` (paper, Eq. 9). Displacements belong to points of the body, not
-of the moving surface.
+After a jump and in the first step of a stage, kappa is 0. The second rule is exact for u linear in time. The third
+is equivalent to Eqs. (7)-(9) of the paper (named in `physics.prony`). With `alpha = G_inf + sum gain_k` and the map
+`m = sum decay_k h_k - (sum gain_k) u + (sum back_k) du_before`, it follows that `A p = alpha u_new + m`: a step is a
+contact problem of an elastic body of modulus alpha with the effective heights `h + m/alpha` (paper, Eq. 9), where h are
+the heights of the rigid surface. Displacements belong to points of the body, not of the moving surface.
 
 A body has the methods `begin` and `commit`, which take and return a `BodyMemory`; after a dropped step, the memory from
 which the step began is still valid. A step of length 0 is a jump of the load, without relaxation. A body without
 relaxing branches (`branched` is None) may have a method `time_error(memory, trial, dt)`, which returns the relative
 error that the length of a step causes.
 
-Two kinds of branches have no map (`effects.branches` selects them and bounds the error): memoryless branches,
-for which `h_k = gain du + back du_before`, and frozen branches, which are springs `h_k = G_k u`.
+For two kinds of branches the map h_k is not stored (`effects.branches` selects them and bounds the error):
+memoryless branches, for which `h_k = gain du + back du_before`, and frozen branches, which are springs `h_k = G_k u`.
 """
 
 import math
@@ -59,14 +59,15 @@ class MovedHeights:
 
 @dataclass
 class BodyMemory:
-    """Memory of a body between two steps, on the rows of this rank: displacement of its surface, its `increment` in the
-    last step, and the branch maps.
+    """Memory of a body between two steps, on the rows of this rank: the displacement u of its surface, the `increment`
+    of u in the last step, and the branch maps.
 
-    `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over the
-    last step. The next `begin` makes this advance, with the increments in the last step and in the step before it (map
-    `before`), and puts the effective heights into the map `before`. Another step may still begin from the same memory.
-    The memories before and after a step share all maps but the displacement: once a step has begun from the memory
-    after, the memory before is invalid.
+    `displacement` is None if it must be computed from the pressure. `pending` holds the coefficients by which the
+    branch maps advance over the last step. The next `begin` advances them, from the increment of the last step and the
+    increment of the step before (map `before`), and then overwrites the map `before` by the effective heights. If this
+    next step is dropped, another step may begin from the same memory. The memories at the start and at the end of a
+    step share all maps but the displacement: once a step has begun from the memory at the end, the memory at the start
+    is invalid.
     """
 
     displacement: Array | None
@@ -80,8 +81,9 @@ class BodyMemory:
 class Trial:
     """A step of a body that has begun. To drop the step, nothing need be called.
 
-    Its contact problem has an elastic body of modulus `alpha` and the `effective` heights, a map that is valid until
-    the next step begins. `advance` has the coefficients of the branches over the step.
+    The contact problem of the step is that of an elastic body of modulus `alpha` with the `effective` heights, a map
+    that is valid until the next step begins. `heights` are the heights of the rigid surface. `advance` has the
+    coefficients of the branches over the step.
     """
 
     alpha: float
@@ -95,13 +97,13 @@ NO_MAP = np.zeros((0, 0))
 
 
 class ElasticBody:
-    """A body with one modulus. It has no memory and allocates at most the moved heights."""
+    """A body of one shear modulus, without memory. The only map that it allocates is that of moved heights."""
 
     branched: "ZenerBody | None" = None
     shortest_time = math.inf  # of the relaxation [s]
 
     def __init__(self, slab: Slab, modulus: float, moves: bool = True) -> None:
-        """Make a body; `moves` is False if the heights never move by an offset."""
+        """Make a body of shear `modulus`; `moves` is False if the heights never move by an offset."""
         self.slab, self.modulus = slab, modulus
         self._moved = slab.empty() if moves else None
 
@@ -113,8 +115,9 @@ class ElasticBody:
         """Do nothing: the displacement follows from the pressure."""
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step whose effective heights are the moved heights; local to this rank. The displacement of `memory`
-        is dropped, as the next solve overwrites its map."""
+        """Begin a step; local to this rank. The effective heights are the `heights` themselves, moved by their
+        offset; `dt` and `growth` have no effect. The displacement of `memory` is dropped, as the next solve
+        overwrites its map."""
         memory.displacement = None
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights, NO_BRANCHES)
@@ -123,12 +126,13 @@ class ElasticBody:
         return Trial(self.modulus, self._moved, heights, NO_BRANCHES)
 
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
-        """Return the memory after a step with this displacement, valid until the next step begins."""
+        """Return the memory after a step that ends at this displacement. The memory is valid until the next step
+        begins; `out` is not used."""
         return replace(memory, displacement=displacement)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement under the pressure `alpha p`; collective. If the memory has dropped the displacement,
-        it is computed from `of_pressure()`, the displacement under p for the modulus 1."""
+        """Return the displacement u; collective. If the memory has dropped u, u is computed from `of_pressure()`, the
+        displacement of a body of modulus 1 under the map p; the pressure is `alpha p`."""
         if memory.displacement is None:
             memory.displacement = of_pressure()
             memory.displacement *= alpha / self.modulus  # 1 after a step of this body
@@ -156,9 +160,9 @@ class _Coefficients:
 class ZenerBody:
     """A body whose relaxing branches are the terms of `prony`.
 
-    The lists `kept`, `moving`, `memoryless` and `frozen` have numbers of branches. Branches of `kept` have one map
-    each, in this order; `memoryless` and `frozen` branches have none. All branches that are not frozen are `moving`.
-    `shortest_time` [s] is the shortest relaxation time of the branches in `kept`.
+    `kept`, `memoryless`, `frozen` and `moving` are lists of indices of terms. Each branch of `kept` has a map, in the
+    order of this list; `memoryless` and `frozen` branches (`physics.body`) have none. `moving` has all branches that
+    are not frozen. `shortest_time` [s] is the shortest relaxation time of the branches in `kept`.
     """
 
     def __init__(
@@ -186,7 +190,7 @@ class ZenerBody:
         self._coefficients = None
 
     def elapsed(self, dt: float) -> Array:
-        """Return `z = dt/tau` of each branch."""
+        """Return `z = dt/tau`, the length of a step divided by the relaxation time, for each branch."""
         return elapsed(self.prony, dt)
 
     def coefficients(self, dt: float, growth: float = 0.0) -> Advance:
@@ -200,7 +204,8 @@ class ZenerBody:
         return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
-        """Put a displacement and the map of each branch of `prony`, in order, into `memory`."""
+        """Put a displacement and branch maps into `memory`. `branches` yields the map h_k of every term of `prony`, in
+        order; maps of branches that are not in `kept` are skipped."""
         surface_of(memory)[...] = displacement
         for k, branch in enumerate(branches):
             if k in self.kept:
@@ -208,10 +213,11 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus alpha with the effective heights `h + r/alpha`; local to this rank. It replaces any
-        step that has begun from the same memory.
+        """Begin a step of modulus `alpha`, whose effective heights are those of the module; local to this rank. The new
+        step replaces any step that has begun from the same memory.
 
-        `growth` is dt divided by the length of the step before; 0 after a jump and in the first step of a stage.
+        `growth` is dt divided by the length of the step before. `growth` is 0 after a jump and in the first step of a
+        stage.
         """
         if self._coefficients is None or (self._coefficients.dt, self._coefficients.growth) != (dt, growth):
             self._coefficients = self._coefficients_of(dt, growth)
@@ -238,7 +244,8 @@ class ZenerBody:
         return surface_of(memory)
 
     def advance_branches(self, memory: BodyMemory) -> None:
-        """Advance the branch maps to the end of the last step, so that they can be read. Results do not change."""
+        """Advance the branch maps to the end of the last step, so that they can be read. Later steps give the same
+        results as without this call."""
         if self.slab.only_counts:
             return
         u = surface_of(memory)
@@ -247,8 +254,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of the memory, and the moduli and relaxation times, which must be those of the
-        checkpoint from which a run continues."""
+        """Return the checkpoint entries: the memory, and the moduli and relaxation times, which must equal those of the
+        body that reads the checkpoint."""
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),
@@ -258,10 +265,12 @@ class ZenerBody:
     def memory_entries(
         self, memory: BodyMemory, unit: float, symbol: str, branch_unit: float, branch_symbol: str
     ) -> dict[str, Entry]:
-        """Return checkpoint entries of displacement, last increment, branch maps and frozen branches.
+        """Return the checkpoint entries of the displacement, its last increment, the branch maps, and which branches
+        are frozen.
 
-        `unit` and `symbol` belong to displacements, `branch_unit` and `branch_symbol` to branch maps. Branch maps are
-        optional, as a branch may have had no map when a checkpoint was written.
+        `unit` is the SI value of the unit of displacements, and `symbol` is the name of the SI unit; `branch_unit` and
+        `branch_symbol` are the same for branch maps. Branch maps are optional, as a branch may have had no map when a
+        checkpoint was written.
         """
         self.advance_branches(memory)
         frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
@@ -290,10 +299,11 @@ Body = ElasticBody | ZenerBody
 
 
 def remembers(body: Body) -> bool:
-    """Return True if the body has a memory, which all but an elastic body have."""
+    """Return True unless the body is an `ElasticBody`, which is the only one without memory."""
     return type(body) is not ElasticBody
 
 
 def states_errors(body: Body) -> bool:
-    """Return False for a body with a memory that has neither branches nor a method `time_error`."""
+    """Return True if the error of a time step can be computed: the body has no memory, has branches, or has the method
+    `time_error`."""
     return not remembers(body) or body.branched is not None or hasattr(body, "time_error")

@@ -1,20 +1,21 @@
-"""Convolutions on a grid, by a symbol on the wavenumbers of a transform or by coefficients in space, and on tiles.
+"""Operators on maps of a grid, given by a symbol or by coefficients in space, and operators on tiles of a grid.
 
-Operators on tiles, and from tiles to the whole grid, cost in proportion to the points of the tiles, not of the box.
+The cost of operators on tiles, and of operators from tiles to the whole grid, is proportional to the number of
+points of the tiles, not of the box.
 
-The coefficients between two tiles depend on their offset only, and are split (P. P. Ewald, Ann. Phys. 369 (1921)
-253) with a length s and the distance r:
+The coefficients between two tiles depend on their offset only. With the distance r of two points and a length s,
+they are split into two parts (P. P. Ewald, Ann. Phys. 369 (1921) 253):
 
     1/r = (1 - erf(r/s))/r + erf(r/s)/r.
 
-The first part vanishes beyond `REACH s`: it is computed as a cyclic convolution between near tiles, of twice their
-side. The second part varies over lengths of s: loads of points are transferred to the nodes of a regular grid, at
-distances of `s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are
-interpolated (A. Brandt and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means
-over a cell. The error is below 1e-6 of the displacement.
+The first part vanishes beyond `REACH s`: it is a cyclic convolution between near tiles, padded to twice their side.
+The second part varies over lengths of s: loads of points are transferred to the nodes of a regular grid, at distances
+of `s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A.
+Brandt and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. The
+error is below 1e-6 of the displacement.
 
-Maps of T tiles of SIDE x SIDE points are stacked to one map of `T SIDE` rows. Transforms of near tiles, of twice their
-side, are multiplied and summed.
+Maps of T tiles of SIDE x SIDE points are stacked to one map of `T SIDE` rows. The transform of the result on a tile
+is the sum over near tiles of their transforms, each multiplied by the symbol for the offset of the two tiles.
 """
 
 import math
@@ -39,9 +40,10 @@ PARTS = 16  # tuning: parts of a spectrum that are computed one after the other,
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    `part(rows)` returns the symbol on these rows of the spectrum. `symbols` holds, for each block of columns, the
-    symbol multiplied by the scale of the transforms, in the type `dtype`. If the symbol is `even` in q_y, only rows of
-    q_y >= 0 are made. If `later` is True, the symbols are made at the first use of the operator.
+    `part(rows)` returns the symbol on these rows of the spectrum. The symbol is multiplied by the scale of the
+    transforms and stored in `symbols`, with the type `dtype`, as one array for each block of columns. If the symbol is
+    `even` in q_y, only the rows of q_y >= 0 are stored. If `later` is True, the symbol is computed at the first use of
+    the operator.
     """
 
     def __init__(
@@ -83,17 +85,19 @@ class Convolution:
         return self.fft.convolve(field, self.symbols, out)
 
     def mean(self) -> float:
-        """Return the value of the uniform field to which the operator takes the uniform field 1; collective."""
+        """Return the uniform value of the result for a field that is 1 everywhere; collective."""
         owns = self.fft.columns.start == 0 < self.fft.columns.stop
         own = float(self.symbols[0][0, 0].real) * self.fft.mx * self.fft.my if owns else 0.0
         return self.fft.slab.sum(own)[0]
 
     def loss(self, field: Array, size: tuple[float, float], direction: tuple[float, float]) -> float:
-        """Return `-sum p du/ds` for a field p and its image u, with the slope along a unit `direction`; collective.
+        """Return `-sum p du/ds` for a field p and its image u, where s is the coordinate along the unit vector
+        `direction`; collective.
 
-        In Fourier space this is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size`, or of the padded
-        box. For a pressure under a surface that slides along s at the speed v, the sum is the dissipated power divided
-        by v. The sum is 0 for a real symbol, such as the symbol of an elastic body.
+        In Fourier space this is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a transform of mx x my points.
+        `size` is the size of the box (lx, ly), which the transform may pad. For a pressure under a surface that slides
+        along s at the speed v, the sum is the dissipated power divided by v. The sum is 0 for a real symbol, such as
+        the symbol of an elastic body.
         """
         total, spectrum = 0.0, self.fft.forward(field)
         lengths = size[0] * self.fft.mx / self.fft.slab.nx, size[1] * self.fft.my / self.fft.slab.ny
@@ -109,10 +113,11 @@ class Convolution:
 
 
 class MirroredConvolution:
-    """A linear operator on maps that are continued mirrored at their edges, by its real symbol on `cosines`.
+    """A linear operator on maps that are continued mirrored at their edges, given by a real symbol on the wavenumbers
+    of the transform `cosines`.
 
-    `part(rows)` returns complex numbers: their real part is the symbol for the real parts of the spectrum, their
-    imaginary part is the symbol for the imaginary parts.
+    `part(rows)` returns two values of the symbol in each complex number: the real part is the symbol for the real part
+    of the spectrum, and the imaginary part is the symbol for the imaginary part.
     """
 
     def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
@@ -152,8 +157,8 @@ def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple
 
 
 def travelling_wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Return `wavenumbers` with 0 in place of Nyquist wavenumbers, whose sign is not defined: the slope of such a wave
-    is 0 on the grid."""
+    """Return `wavenumbers`, with 0 in place of the Nyquist wavenumbers: their sign is not defined, and the slope of
+    these waves is 0 at all points of the grid."""
     qx, qy = wavenumbers(fft, size, rows)
     along_x, along_y = fft.modes
     return np.where(2 * np.abs(along_x) == fft.mx, 0.0, qx), np.where(2 * np.abs(along_y[rows]) == fft.my, 0.0, qy)
@@ -176,9 +181,10 @@ def tabulate(
     the whole table.
 
     `coefficient(x, y, dx, dy)` is the displacement at the distance (x, y) [length] from a cell under unit pressure. A
-    coefficient that is `even` in x and y is computed once per distance, and for half of the distances if it is
-    `symmetric` in x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at
-    the next call of the transform.
+    coefficient is `even` if it does not change with the signs of x and y: each distance is then computed once. A
+    coefficient is `symmetric` if it does not change when x and y are exchanged: on square cells, half of these
+    distances are then computed. With `inside`, the symbol is stored in the memory of the transform and is lost at the
+    next call of the transform.
     """
     transform = table_transform(fft, inside)
     if fft.slab.only_counts:
@@ -197,7 +203,8 @@ def tabulate(
 
 
 def table_transform(fft: FFT, inside: bool) -> FFT:
-    """Return the transform for a table of coefficients, with the lengths of `fft`; collective."""
+    """Return a transform in double precision with the lengths of `fft`, for a table of coefficients; collective. With
+    `inside`, this transform uses the memory of the spectrum of `fft` if the precision of `fft` is double, too."""
     sharing = fft if inside and fft.dtype == np.float64 else None
     return FFT(fft.slab.resized(fft.mx, fft.my), measured=fft.measured, sharing=sharing)
 
@@ -225,8 +232,9 @@ LONGEST_CELL = 2.0  # tuning: largest ratio of sides of a cell for which tiles a
 
 @dataclass(frozen=True)
 class Tiles:
-    """Tiles of a grid of `points = (nx, ny)`, given by their rows and columns among all tiles. The last tiles may be
-    cut at the end of the grid."""
+    """Some of the tiles into which a grid of `points = (nx, ny)` is divided. `rows` and `columns` are the places of the
+    tiles in the division, each of shape (number of tiles,). The last tiles along x and y may be cut at the end of the
+    grid."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
@@ -243,7 +251,8 @@ class Tiles:
 
     @cached_property
     def numbers(self) -> NDArray[np.intp]:
-        """Number of each tile of the grid, -1 for absent tiles."""
+        """Place of each tile of the grid in the stacked map, shape (tiles along y, tiles along x); -1 for tiles that
+        are not among `rows` and `columns`."""
         across, down = tiles_along(self.points)
         numbers = np.full((down, across), -1)
         numbers[self.rows, self.columns] = np.arange(self.count)
@@ -258,7 +267,8 @@ def tiles_along(points: tuple[int, int]) -> tuple[int, int]:
 class TileConvolution:
     """A convolution between tiles with an offset of at most `reach` tiles along x and y.
 
-    `quadrant` has the coefficients at distances from 0 to `SIDE (reach + 1) - 1` points along y and x.
+    `quadrant` has the coefficients at distances from 0 to `SIDE (reach + 1) - 1` points along y and x. Coefficients are
+    even in x and y.
     """
 
     def __init__(self, tiles: Tiles, reach: int, quadrant: Array, tally: Tally) -> None:
@@ -292,8 +302,9 @@ class TileConvolution:
         self._forward.execute()
 
     def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
-        """Yield the result for the transformed map on each of the tiles `columns` in a row of tiles. A result is valid
-        until the next one is yielded."""
+        """Yield the result for the last map that was passed to `transform`, on the tiles of the grid at this `row`
+        and these `columns`, in order. Each result has the shape (SIDE, SIDE) and is valid until the next result is
+        yielded."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
             self._add_up(rows, columns[place : place + 1], own)
@@ -306,7 +317,7 @@ class TileConvolution:
         _add_products(tiles.numbers, rows, columns, self._symbols, self._waves, sums)
 
     def reached(self) -> NDArray[np.bool_]:
-        """Return a mask of the tiles of the grid that are near one of these tiles."""
+        """Return a mask of the tiles of the grid that are within `reach` of a tile of the operator."""
         reached = np.zeros(self.tiles.numbers.shape, np.bool_)
         for row, column in zip(self.tiles.rows.tolist(), self.tiles.columns.tolist(), strict=True):
             rows, columns = (slice(max(place - self._reach, 0), place + self._reach + 1) for place in (row, column))
@@ -330,8 +341,9 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
 
 
 def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally: Tally) -> TileConvolution:
-    """Return a preconditioner: an operator from displacement to pressure between adjacent tiles with the symbol `|q|/(1
-    - nu)`, whose coefficients fall with the third power of the distance."""
+    """Return a preconditioner on tiles, from displacement to pressure. Its symbol is `|q|/(1 - nu)`. The coefficients
+    fall with the third power of the distance, and only those between adjacent tiles are kept. `tally` counts the
+    allocated memory and the operator calls."""
     length = 8 * SIDE
     qx, qy = (
         2.0 * np.pi * np.fft.fftfreq(length, each / count) for each, count in zip(size, tiles.points, strict=True)
@@ -378,8 +390,8 @@ GAUSS = 0.5 / math.sqrt(3.0)  # two-point Gauss rule over a cell
 class TileOperator:
     """Operator from pressure to displacement on tiles.
 
-    `near` has the coefficients of the first part of the module, at distances along y and x from 0 up; `nodes` computes
-    the second part.
+    `near` has the coefficients of the first part of 1/r, as split in the module, at distances along y and x from 0 up;
+    `nodes` computes the displacement by the second part.
     """
 
     def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes", tally: Tally) -> None:
@@ -413,8 +425,8 @@ class TileOperator:
         return nodes
 
     def displace(self, field: Array, parts: list[slice], take: Callable[[int, Array], None]) -> None:
-        """Compute the displacement of the whole grid under a stacked map, and call `take(number, map)` for each of the
-        row ranges `parts`, in their order."""
+        """Compute the displacement of the whole grid under a stacked map. For each of the row ranges `parts`, in order,
+        call `take(number, map)` with the index of the range and the displacement on its rows."""
         nodes = self._displace_nodes(field)
         self._near.transform(field)
         nx, _ = self._tiles.points
@@ -458,7 +470,7 @@ class FreeNodes:
         self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
 
     def displace(self) -> None:
-        """Replace the loads of nodes in `map` by displacements."""
+        """Replace the loads in `map`, one for each node, by the displacements of the nodes."""
         self._far.apply(self.map, self.map)
 
 

@@ -1,6 +1,7 @@
-"""Energies of the body, and measures of a step in SI units: load, tangential force, contact area, gaps.
+"""Energies of the body, and measures of a contact: load, tangential force, contact area, gaps.
 
-Energies are the work done on the body, the energy stored in it, and the energy dissipated by its branches.
+Energies are the work done on the body, the energy stored in it, and the energy dissipated by its branches. Measures
+are in SI units.
 
 With `<a, b>` the sum over points, branch k stores `<h_k, A^-1 h_k>/(2 G_k)` and dissipates `<h_k, A^-1 h_k>/(G_k
 tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All energies follow from products of `w = A^-1 du`
@@ -17,15 +18,17 @@ The error of the assumed motion appears in the difference between this work and 
 the integral of `W dd - F ds`. Backward Euler defines no motion within a step: the work follows from the trapezoidal
 rule, the dissipated power is taken at the end of the step, and the balance closes to first order in the time step.
 
-Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length S
-of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx` (V.
-A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells this is
-`SIDE` for each side between a point in contact and one that is not, and less on long cells (`records.excess_of`).
+Counting the cells in contact gives too large an area, as a cell on the edge of contact counts as a whole. With the
+length S of all edges of contact along the sides of cells of length dx, the true area is on average smaller by
+`(pi - 1 + ln 2)/24 S dx` (V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161,
+arXiv:1701.02727). This excess is `SIDE` cells for each side between a point in contact and a point that is not, and
+smaller on long cells (`records.excess_of`).
 
-This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, the pressure ends at the hardness
-H, and a point on the edge carries the share p/H of the hardness: the excess is `1 - p/H` of a cell, and 0 at points
-that have yielded. Where the pressure falls from H to 0 over a cell or more, the edge is as without yielding, although
-points on it may have neighbours that have yielded. The smaller excess of the two holds for both.
+This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, the pressure ends at the
+hardness H, and a point on the edge carries the share p/H of the hardness: the excess is `1 - p/H` of a cell, and 0 at
+points that have yielded. Where the pressure falls from H to 0 over a cell or more, the edge is as without yielding,
+although points on it may have neighbours that have yielded. `Probe` computes both estimates of the excess and takes the
+smaller one.
 """
 
 import math
@@ -51,12 +54,16 @@ NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.lege
 
 @dataclass(frozen=True)
 class EnergyMemory:
-    """Memory of the energies of a body: sums since the start, in the scene's unit of energy. `dissipated` has a number
-    for each branch.
+    """Memory of the energies of a body: `work`, `stored` and `dissipated` since the start, in the unit that
+    `ElasticEnergy` and `ZenerEnergy` name. `dissipated` has one number for each branch.
 
-    A body with branches also needs the products `spring`: `<u, A^-1 u>`; `branches`: `<h_k, A^-1 h_k>`; and with the
-    last increment of u, `increment`: `<du, A^-1 du>` and `crossed`: `<h_k, A^-1 du>`. `elastic` is the memory of
-    `ElasticPressure`, if used.
+    The energies of a body with branches need the products of the last step, with the increment du of u in this step:
+
+    * spring: `<u, A^-1 u>`;
+    * branches: `<h_k, A^-1 h_k>` for each branch;
+    * increment: `<du, A^-1 du>`;
+    * crossed: `<h_k, A^-1 du>` for each branch;
+    * elastic: the memory of `ElasticPressure`; None if `AppliedInverse` is used.
     """
 
     work: float = 0.0
@@ -69,8 +76,9 @@ class EnergyMemory:
     elastic: BodyMemory | None = None
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
-        """Return the energies after a step in which no external work is done. The branches have dissipated what the
-        stored energy has lost, each in proportion to its dissipation since the memory `before`."""
+        """Return the energies after a step without external work, which began at the memory `before`. The stored energy
+        that is lost in the step is distributed to the branches in proportion to the energy that each has dissipated in
+        the step."""
         lost = self.dissipated - before.dissipated
         whole = float(lost.sum())
         share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
@@ -78,7 +86,7 @@ class EnergyMemory:
 
 
 class Pressed(NamedTuple):
-    """Pressure `modulus p` at an instant, with the map p."""
+    """A pressure at an instant, given by a map p and the `modulus` that multiplies the map."""
 
     p: Array
     modulus: float
@@ -91,9 +99,10 @@ class Inverse(Protocol):
 
 
 class StepProducts(NamedTuple):
-    """Products of a branch with the motion (1) of the module in a step, or the weights of these products in a sum: `S =
-    <h_0, A^-1 h_0>/G`, `X = <h_0, A^-1 du>`, `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>`, `F = G
-    <c, A^-1 c>`."""
+    """Products of one branch over a step, or the weights with which an energy is the sum of these products. With the
+    modulus G of the branch, its map h_0 at the start of the step, and the increment du and the bend c of the module,
+    the products are `S = <h_0, A^-1 h_0>/G`, `X = <h_0, A^-1 du>`, `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`,
+    `E = G <du, A^-1 c>`, `F = G <c, A^-1 c>`."""
 
     s: Array
     x: Array
@@ -107,7 +116,8 @@ class StepProducts(NamedTuple):
 
 
 def dissipation_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the energy dissipated in a step z = dt/tau: int <h, A^-1 h>/(G tau)."""
+    """Return the weights of `StepProducts` in the energy that a branch dissipates in a step, which is the integral of
+    `<h, A^-1 h>/(G tau)` over the step. `z = dt/tau` has any shape, as have the weights."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     lost, q = -np.expm1(-safe), bend(safe)
@@ -129,8 +139,9 @@ def dissipation_weights(z: Array) -> StepProducts:
 
 
 def bend_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the work of a step `z = dt/tau` minus the work by the trapezoidal rule:
-    the integral of `<h, A^-1 u'>` minus the mean of `<h, A^-1 du>` at both ends."""
+    """Return the weights of `StepProducts` in the difference between the exact work of a branch in a step and its work
+    by the trapezoidal rule. The exact work is the integral of `<h, A^-1 u'>`; the trapezoidal rule is the mean of
+    `<h, A^-1 du>` at both ends. `z = dt/tau` has any shape."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     q = bend(z)
@@ -140,7 +151,8 @@ def bend_weights(z: Array) -> StepProducts:
 
 
 def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
-    """Return `exp(-z s)`, a and b of (1) at the quadrature points s = NODES, along a new axis, for z up to SMALL."""
+    """Return `exp(-z s)`, a and b of Eq. (1) of the module at the quadrature points s = NODES, along a new axis. Valid
+    for z <= SMALL."""
     x = z[..., None] * NODES
     change = NODES * (np.exp(-x[..., None] * NODES) @ WEIGHTS)
     later = 2.0 * NODES[:, None] * (1.0 - NODES) - 1.0  # 2 x - 1 at x = s - s y
@@ -148,7 +160,7 @@ def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies, in the unit `unit` [J], of a body without memory, which stores all work."""
+    """Computes the energies of a body without memory, which stores all work. Energies are in the unit `unit` [J]."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -169,13 +181,14 @@ class ElasticEnergy:
         body: BodyMemory,
         growth: float = 0.0,
     ) -> EnergyMemory:
-        """Return the energies after a solve for the pressure `now` with the displacement u; one reduction,
-        collective."""
+        """Return the energies after a step that ends at the pressure `now` with the displacement u; collective, with
+        one reduction. The other arguments are not used."""
         stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
         return EnergyMemory(work=stored, stored=stored)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entry of the stored energy, which is optional, as each contact gives it."""
+        """Return the checkpoint entry of the stored energy. The entry is optional, as the energy can be computed from
+        any contact."""
         return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
@@ -185,8 +198,8 @@ class ElasticEnergy:
 
 
 class AppliedInverse:
-    """Computes `A^-1 du` by an operator K that is the inverse of A. `scratch()` returns a map that is free until the
-    next solve."""
+    """Computes `A^-1 du` with the operator `inverse`, which must be the exact inverse of A (periodic half space with
+    the spectral kernel). `scratch()` returns a map that is free until the next solve."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -211,10 +224,14 @@ class AppliedInverse:
 class ElasticPressure:
     """Computes `v = A^-1 u`, the pressure that causes u on an elastic body of modulus 1, without an inverse of A.
 
-    A acts on space and relaxation on time, so that they commute: with `h_k = A m_k` the law of the body,
+    A acts on space and relaxation acts on time, so that they commute. With maps m_k, for which `h_k = A m_k`, the law
+    of the body
 
-        A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     becomes at every point
-          p = G_inf v + sum_k m_k,     dm_k/dt = G_k dv/dt - m_k/tau_k.
+        A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k
+
+    becomes a law that holds at each point alone:
+
+        p = G_inf v + sum_k m_k,       dm_k/dt = G_k dv/dt - m_k/tau_k.
 
     So v is the displacement of a second `ZenerBody`, each point of which responds to the pressure at this point only.
     """
@@ -229,15 +246,17 @@ class ElasticPressure:
     def advance(
         self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float
     ) -> tuple[Array, BodyMemory]:
-        """Return the increment of v in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after the
-        step, in the maps of the memory before; local to this rank."""
+        """Return `A^-1 du`, which is the increment of v in a step, and the memory after the step; local to this rank.
+        The map p is the pressure at the end of the step, divided by the modulus alpha of the step. The memory after the
+        step uses the maps of the memory before."""
         assert memory is not None
         v = surface_of(memory)
         now = self.body.commit(memory, self.body.begin(memory, dt, MovedHeights(v), growth), p, v)
         return now.increment, now
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries of the second body, with strains instead of displacements."""
+        """Return the checkpoint entries of the second body. Here v, a pressure for the modulus 1, takes the place of
+        the displacement; v has the unit of a strain."""
         assert memory is not None
         strain = units.height / units.length
         return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
@@ -249,7 +268,7 @@ class ElasticPressure:
 
 
 class ZenerEnergy:
-    """Energies of a `ZenerBody`; `unit` [J] is their unit."""
+    """Computes the energies of a `ZenerBody`, in the unit `unit` [J]."""
 
     def __init__(
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
@@ -273,10 +292,11 @@ class ZenerEnergy:
         body: BodyMemory,
         growth: float = 0.0,
     ) -> EnergyMemory:
-        """Return the energies after a step from the pressure `before` to `now`; `body` is the memory of the body after
-        the step. One reduction; collective.
+        """Return the energies after a step from the pressure `before` to the pressure `now`; collective, with one
+        reduction. `body` is the memory of the body after the step.
 
-        `growth` is dt over the length of the step before (`physics.body`). The maps of an `elastic` memory are reused.
+        `growth` is dt divided by the length of the step before (`physics.body`). The maps of an `elastic` memory are
+        reused.
         """
         material, du, moduli = self.material, body.increment, self.material.prony.moduli
         w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du, growth)
@@ -348,8 +368,8 @@ class _Yielding(NamedTuple):
 
 @dataclass(frozen=True)
 class Probe:
-    """Computes measures from the maps of a solved step. `shears` are further friction of the contact area; pressures
-    end at the `hardness` [Pa], if given."""
+    """Computes measures from the maps of a solved step. `shears` are sources of friction in the contact area
+    (`surface.Shear`). `hardness` [Pa] is the largest pressure, None if pressures have no limit."""
 
     slab: Slab
     surface: Surface
@@ -378,9 +398,9 @@ class Probe:
         """Return the measures of the pressure `alpha p` with the gap `u - h - d`; collective.
 
         The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not 0
-        where the surfaces touch. Friction is 0 unless the load is compressive and above `least_load` [N], the rounding
-        error of two balanced forces. If nothing touches, all pressure is tension, and a load above 0 is an error of the
-        solve.
+        where the surfaces touch. Friction is 0 unless the load is compressive and above `least_load` [N], below which
+        the load is only the rounding error of two forces in balance. If no point touches, all pressure is tension, a
+        load above 0 is only an error of the solve, and friction is 0, too.
         """
         units, points = self.units, self.slab.points
         along_x, along_y = self.surface.periodic

@@ -4,21 +4,18 @@ An elastic half space of shear modulus 1 under the pressure p moves by the Bouss
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
-For a modulus G divide by G. Lengths have any unit; the unit of displacements is this unit times pressure/modulus. The
-kernel `spectral` uses this symbol; the kernel `love` takes the pressure as constant on each cell, and
-the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. Another body
-multiplies the symbol by its compliance ratio (`Response`).
+Displacements of a body of modulus G are these divided by G. Lengths have any unit; the unit of displacements is this
+unit times pressure/modulus. The kernel `spectral` uses this symbol; the kernel `love` takes the pressure as constant on
+each cell, and the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to
+0. For another body, the symbol is multiplied by the ratio of its compliance to that of the half space (`Response`).
 
-A pressure wave `exp(i q x)` that moves with the surface at the velocity v loads a point of a viscoelastic body at
-the angular frequency `-q v`, so that in the frame of the surface
+A pressure wave `exp(i q x)` that moves with the surface at the velocity vector v loads a point of a viscoelastic
+body at the angular frequency `-q v`, so that in the frame of the surface
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
-The wake of an isolated contact is not periodic: influence coefficients are integrals along the wake.
-
-Love's coefficients are the displacement of the half space under a pressure that is constant on one cell.
-
-For a shear modulus of 1 (A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2)
+Love's coefficients A are the displacement of a free half space of shear modulus 1 under a unit pressure on one cell
+(A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2):
 
     A(x, y) = (1 - nu)/(2 pi) int_cell dx' dy' / sqrt((x - x')^2 + (y - y')^2).
 
@@ -36,12 +33,12 @@ of such a load at the distance Ly, the width of the box:
 So each load within the box moves every point of the box downwards, and pressures do positive work. Under a prescribed
 load this choice changes only the approach, not pressures and gaps.
 
-In an isolated contact that slides at the velocity v, a body point that is now at x was at `x + v t` a time t ago. With
-the creep function
+The wake of an isolated contact that slides is not periodic. At the velocity vector v, a body point that is now at x
+was at `x + v t` a time t ago. With the creep function of glassy compliance J_g and retardation times l_i,
 
     J(t) = J_g + sum J_i (1 - exp(-t/l_i)),
 
-the influence coefficients are Love's A(x) plus, for each term, an integral along the wake (for G = 1):
+the influence coefficients K are Love's A(x), multiplied by J_g, plus an integral along the wake for each term:
 
     K(x) = J_g A(x) + sum J_i int_0^inf exp(-t/l_i)/l_i A(x + v t) dt.
 """
@@ -121,17 +118,18 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
 
 
 def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array:
-    """Return the compliance for cell-constant pressure divided by the compliance for a sampled wave, for each
-    wavenumber; to 14 digits.
+    """Return the factor by which the kernel `love` multiplies the symbol of the kernel `spectral`, for each wavenumber
+    of `rows` of a spectrum; accurate to 14 digits.
 
-    `size` is the size of the box, `rows` are rows of a spectrum. A wave of cell-constant pressures contains all aliases
-    of its wavenumber, each with the form factor of the cell: `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) /
-    |q+Q|` over the reciprocal lattice Q of the grid. With
+    `size` is the size of the box. A wave of pressures that are constant on each cell contains all aliases of its
+    wavenumber, each with the form factor of the cell. So the factor is
+    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
 
         1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
 
-    the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
-    Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) starts far inside a cell and ends far outside the box.
+    the sums over Qx and Qy separate, and the integral is one product of matrices. The integral over t is computed by
+    double exponential quadrature (H. Takahasi and M. Mori, Publ. RIMS 9 (1974) 721), from lengths far below a cell to
+    lengths far beyond the box.
     """
     qx, qy = wavenumbers(fft, size, rows)
     dx, dy = size[0] / fft.mx, size[1] / fft.my
@@ -169,8 +167,9 @@ GAUSS = 0.5 / np.sqrt(3.0)  # nodes of two points over a cell [cells]
 
 
 def strip_coefficients(x: Array, y: Array, dx: float, dy: float, *, size: tuple[float, float], poisson: float) -> Array:
-    """Return the displacement [length] at (x, y) from the centre of a `dx x dy` cell and its images, under a unit
-    pressure on the cell and each image, for G = 1; |x| <= lx/2 for the box of `size = (lx, ly)`."""
+    """Return the displacement [length] at (x, y) from the centre of a `dx x dy` cell, under a unit pressure on this
+    cell and on each of its images, for G = 1. The box of `size = (lx, ly)` is periodic along x only; |x| must not
+    exceed lx/2."""
     total = sum(np.asarray(over_cell(x + m * size[0], y, dx, dy)) for m in range(-NEAREST, NEAREST + 1))
     nodes = [(a * GAUSS * dx, b * GAUSS * dy) for a in (-1, 1) for b in (-1, 1)]
     rest = sum(_far_images(x + a, y + b, size) for a, b in nodes) / len(nodes)
@@ -323,23 +322,26 @@ UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as 
 
 @dataclass(frozen=True)
 class Response:
-    """Response of the surface of a body of shear modulus 1 to pressure, here of a half space; effects may return that
-    of another body (`effects.effect.Effect`). Wavenumbers q and lengths have one unit; arrays have any shape."""
+    """Response of the surface of a body of shear modulus 1 to pressure. This class is the response of a half space;
+    effects may return a subclass for another body (`effects.effect.Effect`). Wavenumbers q are in 1/length for one unit
+    of length; arrays have any shape."""
 
     thickness: float = math.inf
     poisson: float = field(default=0.5, kw_only=True)
 
     @property
     def mean_compliance(self) -> float:
-        """Displacement per unit of uniform pressure in a periodic box."""
+        """Displacement of the surface of a periodic box divided by a uniform pressure."""
         return 0.0
 
     def compliance_ratio(self, q: Array) -> Array | float:
-        """Return the ratio of the displacement under waves of pressure to that of a half space."""
+        """Return the displacement under waves of pressure of wavenumbers q, divided by the displacement of a half
+        space."""
         return 1.0
 
     def compliance(self, q: Array) -> Array:
-        """Return the ratio of displacement to pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
+        """Return the ratio of displacement to pressure of waves on a periodic body, 0 for q = 0. The factor of the
+        kernel `love` is not included."""
         with np.errstate(divide="ignore"):
             found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
         found *= self.compliance_ratio(q)
@@ -354,12 +356,13 @@ class Response:
         return love(x, y, dx, dy, self.poisson)
 
     def reach(self, size: Vector) -> float:
-        """Return the distance beyond which points in a box hardly interact."""
+        """Return the distance [length] beyond which points of a box hardly act on each other: infinite for a half
+        space."""
         return math.inf
 
     def preconditioner(self, size: Vector) -> Callable[..., Any] | None:
-        """Return a function that makes a preconditioner from a slab and the `contact.preconditioner` of a half space,
-        for a box in which `stiffness` does not suffice; else None."""
+        """Return None if a preconditioner with the symbol `stiffness` suffices in the box. Otherwise return a function
+        of a slab and a `contact.preconditioner.ExtendedPreconditioner`, which returns a better preconditioner."""
         return None
 
 
@@ -367,11 +370,13 @@ class Response:
 class HalfSpace:
     """A half space of shear modulus 1, loaded inside a box of `size = (lx, ly)` [any unit of length].
 
-    If `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is periodic
-    along x only. Otherwise the box is periodic, with the `kernel`. The argument `fft` of methods is the transform of
-    maps: operators compute in its precision, and symbols have its shape, or the shape of the requested rows. A free
-    half space makes a padded transform for each operator. `factors` multiply the storage and the loss modulus of waves
-    in steady sliding, by wavenumber; None for a linear body. `other` is the response of a body that is no half space.
+    The box is periodic, with the `kernel`, unless it is `free`. Nothing surrounds a free box, and the coefficients are
+    Love's. A free box that `repeats_along_x` is periodic along x only. `other` is the response of a body that is no
+    half space. `factors` is None for a linear body; otherwise it is a function of wavenumbers that returns two factors
+    for each, on the storage and on the loss modulus in steady sliding.
+
+    The argument `fft` of methods is the transform of maps: operators compute in its precision. Symbols have the shape
+    of its spectrum, or of the `rows` of the spectrum. A free half space makes a padded transform for each operator.
     """
 
     size: Vector
@@ -389,8 +394,8 @@ class HalfSpace:
 
     @property
     def moves_in_the_mean(self) -> bool:
-        """True if a uniform pressure moves the surface: not on a periodic half space, nor on another body that is
-        incompressible."""
+        """True if a uniform pressure moves the surface. False for a periodic half space, and for another periodic body
+        that is incompressible."""
         return self.free or self.response.mean_compliance > 0.0
 
     # -- elastic ------------------------------------------------------------------------------------------------------
@@ -404,10 +409,11 @@ class HalfSpace:
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space, without the kernel.
+        """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space. The factor of the
+        kernel `love` is not included.
 
-        At q = 0, where a periodic half space has no inverse, the ratio is the value of the smallest wavenumber, which
-        keeps it positive.
+        At q = 0, where a periodic half space has no inverse, the ratio at the wavenumber of the box is used, so that
+        the symbol is positive everywhere.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
@@ -428,8 +434,8 @@ class HalfSpace:
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Return the lengths of an operator's padded transform for maps with `points`; None if the operator uses the
-        transform of the maps."""
+        """Return the lengths (along x, along y) of the padded transform of an operator for maps of `points = (nx, ny)`;
+        None if the operator uses the transform of the maps."""
         if not self.free:
             return None
         lengths = padded_lengths(*points)
@@ -459,9 +465,9 @@ class HalfSpace:
     def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
         """Return the operator from displacement to pressure.
 
-        The operator is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and
-        for another body, it is a preconditioner. In a free box displacements are continued mirrored at the edges, so
-        that they have no jump there.
+        For the periodic half space with the spectral kernel the operator is exact, but not for the mean. Otherwise the
+        operator is only approximate, for use as a preconditioner. In a free box displacements are continued mirrored at
+        the edges, so that they have no jump there.
         """
         if self.free and not self.repeats_along_x:
             cosines = Cosines(fft)
@@ -483,11 +489,13 @@ class HalfSpace:
     # -- of contacts that stick -------------------------------------------------------------------------------------
 
     def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
-        """Return the operators of the gap solver; collective where the half space is free.
+        """Return two operators and two numbers for the gap solver (`effects.adhesion.gap_solver`); collective where the
+        half space is free.
 
-        The first operator takes pressure to displacement, and the second is its inverse, 0 for mean values. Two numbers
-        follow: the displacement per unit of uniform pressure, and a factor for mean values that is always positive. A
-        free body is replaced by a periodic one with the same influence coefficients up to half the box.
+        The first operator takes pressure to displacement. The second operator is the inverse of the first, but takes a
+        uniform displacement to 0. The first number is the displacement under a uniform unit pressure, which may be 0.
+        The second number replaces the first in the symbol of the first operator, and is positive where the first number
+        is 0. A free body is replaced by a periodic body with the same influence coefficients up to half the box.
         """
         if self.free:
             table = tabulate(fft, self.size, self.response.coefficient, self.other is None).real
@@ -516,11 +524,12 @@ class HalfSpace:
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
-        """Return a function of rows that returns the moduli G*(-q v) of their waves, times `factors`; at a Nyquist
-        wavenumber, which has two signs, the mean of both.
+        """Return a function of rows of the spectrum, which returns the modulus G*(-q v) of each wave of these rows.
+        Each modulus is multiplied by the `factors`. At a Nyquist wavenumber, which has two signs, the modulus is the
+        mean for both signs.
 
-        The moduli broadcast to the rows: without factors all rows are equal under a surface that slides along x, and
-        one is made.
+        The moduli broadcast to the rows: without factors, and under a surface that slides along x, all rows are equal
+        and the function returns one row.
         """
         if velocity[1]:
             return lambda rows: self._with_factors(fft, self._linear_modulus(fft, velocity, prony, rows), rows)
@@ -566,10 +575,11 @@ class HalfSpace:
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
-        """Return the operator from pressure to the map h_k of branch k of a free body; collective.
+        """Return the operator from pressure to the map h_k of branch `k`, an index of `prony`, of a free body;
+        collective.
 
         In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has the poles of the creep function only: each
-        term i of the creep function is weighted by the response of the branch at the rate -1/l_i.
+        term i of the creep function is multiplied by the response of the branch at `s = -1/l_i`.
         """
         creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
         ratio = -tau / creep.retardation_times

@@ -1,7 +1,7 @@
-"""Fused loops over the rows of this rank, for the body and the surface, and the lowest waves of a transform.
+"""Fused loops over the rows of this rank for the body, the surface and the heat, and the lowest waves of a spectrum.
 
-Heights are a map and a cyclic offset along x. A smooth surface has only low waves, so that only these are stored. They
-are the first rows of a spectrum, q_y >= 0, the last rows, q_y < 0, and the first columns.
+Heights are given by a map and a cyclic offset along x [cells]. Of the spectrum of a smooth surface, only the lowest
+waves are stored. These are the first rows of the spectrum (q_y >= 0) and its last rows (q_y < 0), in the first columns.
 """
 
 import numpy as np
@@ -33,7 +33,8 @@ def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, 
     """Advance the branches, `h_k <- decay_k h_k + gain_k du + back_k buffer`, and put the next effective heights into
     `buffer`: `heights(i - offset) + sum weight_k h_k - weight_u u + weight_du du`.
 
-    Loops over four branches at once use the memory bandwidth better than loops over one branch each.
+    On entry `buffer` holds the increment of u in the step before the last, on return the effective heights. Loops over
+    four branches at once use the memory bandwidth better than loops over one branch each.
     """
     count, ny, nx = branches.shape
     start = offset % nx
@@ -73,7 +74,7 @@ def _advance_four(a, b, c, d, decay, gain, back, weight, change, before, effecti
 @loop
 def commit(displacement, buffer, u, heights, offset, out):
     """Put `u_new = displacement - buffer + heights(i - offset)` into `out`, which may be u, and `u_new - u` into
-    `buffer`."""
+    `buffer`. On entry `buffer` holds the effective heights, on return the increment of u."""
     nx = u.shape[1]
     start = offset % nx
     for j in range(u.shape[0]):
@@ -86,12 +87,17 @@ def commit(displacement, buffer, u, heights, offset, out):
 
 @loop
 def sum_measures(p, u, h, mask, above, cyclic):
-    """Return, over the points of this rank: the sum of p; the number of points in contact, where `mask` is not 0; the
-    sum of `u - h`; the numbers of cell sides between a point in contact and one that is not, for neighbours along x and
-    along y; and the largest p.
+    """Return six numbers over the points of this rank, in this order:
 
-    `above` is the row of the mask before the first. With `cyclic`, the last point of a row is the neighbour of the
-    first. The largest pressure is kept for each column, so that the loop is vectorized.
+    * the sum of p;
+    * the number of points in contact, where `mask` is not 0;
+    * the sum of `u - h`;
+    * the number of cell sides between a point in contact and a point that is not, for neighbours along x;
+    * the same number for neighbours along y;
+    * the largest p.
+
+    `above` is the row of the mask before the first row of this rank. With `cyclic`, the last point of a row is the
+    neighbour of the first. The largest pressure is kept for each column, so that the loop is vectorized.
     """
     load, count, gaps, sides_x, sides_y = 0.0, 0.0, 0.0, 0.0, 0.0
     largest, most = np.empty(p.shape[1]), 0.0
@@ -122,12 +128,15 @@ def sum_measures(p, u, h, mask, above, cyclic):
 
 @loop
 def measure_yielded(p, u, h, above, below, cyclic, highest):
-    """Return sums over the points of this rank for a contact in which pressures end at `highest`, where points yield.
+    """Return four sums over the points of this rank for a contact in which points yield at the pressure `highest`:
 
-    The four sums are: the excess cells if edges at yielded points are sharp, `sum 1 - p/highest` over points between a
-    yielded point and a point without pressure; the number of sides between other points below `highest` and points
-    without pressure; the number of yielded points, and their sum of `u - h`. `above` and `below` are the rows of p
-    before and after the rows of this rank.
+    * the excess cells on edges of contact at yielded points (`physics.energy`), `sum 1 - p/highest` over points below
+      `highest` that have both a yielded neighbour and a neighbour without pressure;
+    * the number of sides between any other point below `highest` and a point without pressure;
+    * the number of yielded points;
+    * the sum of `u - h` at yielded points.
+
+    `above` and `below` are the rows of p before and after the rows of this rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0
@@ -152,9 +161,9 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
 
 @loop
 def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
-    """Return the sums of p, p e^2, p u^2, p (difference of h on both sides)^2, p h, p h^2 and p increment^2 over every
-    `stride`-th row, from row `first`, with `e = sum decay_k h_k + gain increment + past before` and h = `heights(i -
-    offset)`.
+    """Return the sums from which `march.controller` estimates the time error: the sums of p, p e^2, p u^2,
+    `p (h(i + 1) - h(i - 1))^2`, p h, p h^2 and p increment^2 over every `stride`-th row, from row `first`. Here e is
+    `sum decay_k h_k + gain increment + past before` with the branch maps h_k, and h is `heights(i - offset)`.
 
     Points without pressure are skipped; each run of points with pressure is summed on its own.
     """
@@ -220,11 +229,12 @@ def work(p, alpha, p_old, alpha_old, du):
 
 @loop
 def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
-    """Extrapolate a pressure that moves with the surface: put `S (factor p - factor_old S p_old)`, within bounds, into
-    `out`.
+    """Extrapolate linearly from two pressures in the frame of the moving surface: put
+    `S (factor p - factor_old S p_old)`, between `lower` and `upper`, into `out`. `p_old` is the pressure one step
+    before p; `out` may be `p_old`.
 
-    S shifts by `shift` cells along x (cyclic); `out` may be `p_old`. Whole cells keep the contact sharp.
-    Interpolation between cells would spread it, which costs more iterations than an error of half a cell.
+    S shifts a map by `shift` cells along x (cyclic). The shift is by whole cells, as interpolation between cells would
+    spread the contact, which costs more iterations than an error of half a cell.
     """
     ny, nx = p.shape
     start = shift % nx
@@ -260,8 +270,8 @@ def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
 
 @loop
 def displace(h, rows, along_x, along_y, out):
-    """Put the spectrum of moved heights into `out`: `along_x along_y h` with the phases of the shift in the `rows` and
-    first columns of h, 0 elsewhere."""
+    """Put the spectrum of the moved heights into `out`: `along_x along_y h` in the `rows` and first columns of the
+    stored waves h, 0 elsewhere. `along_x` and `along_y` are the phase factors of the shift along x and y."""
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             out[j, i] = 0.0
@@ -273,14 +283,18 @@ def displace(h, rows, along_x, along_y, out):
 
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
-    """Advance all waves of heat by a step dt, put the spectrum of the temperature into `out`, and store the present
-    sources.
+    """Advance all waves of heat by a step dt, put the spectrum of the temperature of the surface into `out`, which may
+    be one of the `sources`, and store the sources at the end of the step. Return the sum over all waves but the mean of
+    the temperature at depth times the pressure at the end of the step (`effects.heat.solver`).
 
-    Return the sum of the temperature at depth times the pressure (`effects.heat.solver`), without the mean. `known` has
-    rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared wavenumbers times the
-    diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and pressure, each before and after
-    the step. `out` may be one of the `sources`; spectra without rubbing have no row. `heats` has the heat of both
-    sources at the two ends of the step.
+    * waves: spectra of the waves along the depth that have a memory, shape (kept, rows, columns);
+    * known: the rates, weights and shares of heat at depth of all waves along the depth; the decays over the step of
+      the waves with a memory; and the rate^(1/2) at which the waves end (`prony.Exponentials`);
+    * spread: the squared wavenumbers along x and along y, each times the diffusivity, and the multiplicity of columns;
+    * sources: the spectra of rubbing before and after the step, and of pressure before and after the step. The spectra
+      of rubbing have no rows if the surfaces do not rub;
+    * heats: the heat of rubbing and of pressure, each before and after the step, shape (2, 2);
+    * scales: the factors on the spectra of rubbing and of pressure after the step.
     """
     rates, weights, deep, fall, end = known
     spread_x, spread_y, multiplicity = spread
@@ -326,7 +340,8 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
 
 
 def shape_of(waves: tuple[int, int], lengths: tuple[int, int], columns: slice) -> tuple[int, int]:
-    """Return the shape of this rank's part of the lowest waves: `waves` along x and y at most, in its `columns`."""
+    """Return the shape of this rank's part of the lowest waves: at most `waves` along x and y, on the `columns` of this
+    rank. `lengths` are those of the transform."""
     count = min(waves[0], lengths[0] // 2) + 1
     return min(2 * waves[1] + 1, lengths[1]), max(0, min(count, columns.stop) - columns.start)
 

@@ -6,19 +6,19 @@ Source: J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapters 1 and 
 paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". Relaxation times may be
 0 (no stress after the first instant) or infinite (a spring).
 
-The memory of heat is a sum of exponentials, too: each wave of heat on the surface decays like the branches of a body.
+The memory of heat is a sum of exponentials, as is the memory of the body.
 
-Heat of the wavenumber k on the surface, released a time t ago, leaves the temperature `exp(-D k^2 t)/(e sqrt(pi
-t))`, in the Laplace domain `1/(e sqrt(s + D k^2))`, with the effusivity e. With
+Heat of the wavenumber k on the surface of a body of diffusivity D and effusivity e, released a time t ago, leaves
+the temperature `exp(-D k^2 t)/(e sqrt(pi t))`. With
 
     1/sqrt(pi t) = 2/pi int_0^inf exp(-m^2 t) dm ~ sum_j w_j exp(-m_j^2 t),   m_j = m_0 exp(j h),  w_j = 2/pi h m_j  (1)
 
-the memory has one map for each j, which decays at the rate `m_j^2 + D k^2`. Each m belongs to a wave along the depth,
-of wavenumber m/sqrt(D), whose share in heat at depth is the cosine transform of the heat's distribution. The
-trapezoidal rule (1) in ln m has the relative error `2 sum_n 1/sqrt(cosh(pi^2 n/h))` at every t, as the Fourier
-transform of the integrand is a gamma function (G. Beylkin, L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131). All
-waves below m_0 are combined to one wave with their mean rate, correct to second order in `m_0^2 t`; above the last wave
-`erfc(m sqrt(t))` is neglected.
+the memory has one map for each j, which decays at the rate `m_j^2 + D k^2`. The spacing of ln m is h, and the least
+m is m_0. Each m belongs to a wave along the depth, of wavenumber m/sqrt(D); the share of this wave in heat at depth is
+the cosine transform of the distribution of heat over the depth. The trapezoidal rule (1) in ln m has the relative error
+`2 sum_n 1/sqrt(cosh(pi^2 n/h))` at every t, as the Fourier transform of the integrand is a gamma function (G. Beylkin,
+L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131). All waves below m_0 are combined to one wave with their mean
+rate, correct to second order in `m_0^2 t`; above the last wave `erfc(m sqrt(t))` is neglected.
 """
 
 import math
@@ -47,8 +47,8 @@ class Prony(NamedTuple):
 
 
 class CreepSpectrum(NamedTuple):
-    """Creep function J(t) = glass + sum_i compliances[i] (1 - exp(-t/retardation_times[i])) + fluidity t, in 1/Pa, s
-    and 1/(Pa s)."""
+    """Creep function J(t) = glass + sum_i compliances[i] (1 - exp(-t/retardation_times[i])) + fluidity t, with
+    compliances [1/Pa], retardation times [s] and fluidity [1/(Pa s)]."""
 
     glass: float
     compliances: Array
@@ -80,8 +80,9 @@ class CreepSpectrum(NamedTuple):
 
 
 def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Prony:
-    """Return a series equal to this one with ascending, distinct, positive, finite relaxation times and positive
-    moduli. Raises ValueError for numbers that do not define a relaxation function."""
+    """Return the series of the given moduli and times in normal form: the same relaxation function with ascending,
+    distinct, positive, finite relaxation times and positive moduli. Raises ValueError for numbers that do not define a
+    relaxation function."""
     terms, times = np.atleast_1d(np.asarray(moduli, float)), np.atleast_1d(np.asarray(relaxation_times, float))
     if terms.shape != times.shape or terms.ndim != 1:
         raise ValueError(f"There are {terms.size} moduli but {times.size} relaxation times.")
@@ -115,7 +116,8 @@ def zener_to_prony(
 
 
 def relaxation(t: ArrayLike, *material: *Moduli) -> Array:
-    """Return G(t) [Pa] for times t >= 0 [s], any shape; t = 0 is the instant after the step."""
+    """Return the stress G(t) [Pa] at times t >= 0 [s], any shape, after a unit step of strain at t = 0. `material` is
+    the three arguments of `Prony`."""
     spring, terms, times = normal_form(*material)
     return np.asarray(spring + np.exp(-np.asarray(t, float)[..., None] / times) @ terms)
 
@@ -142,14 +144,17 @@ def complex_modulus(omega: ArrayLike, *material: *Moduli) -> ComplexArray:
 def discrete_modulus(
     omega: ArrayLike, dt: ArrayLike, *material: *Moduli, integrator: Integrator = "exponential"
 ) -> ComplexArray:
-    """Return the complex modulus [Pa] of time steps dt > 0 [s] for a displacement sampled from exp(i omega t).
+    """Return the complex modulus [Pa] that an integrator with steps dt > 0 [s] has in effect, for a displacement
+    sampled from exp(i omega t).
 
-    With z = exp(i omega dt) the terms of G_inf + sum_j H_j are
-        backward Euler:      H_j = G_j (1 - 1/z) / (1 + dt/tau_j - 1/z)
-        exponential-linear:  H_j = G_j phi_j (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
-        exponential:         H_j = G_j (phi_j + q_j (1 - 1/z)) (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
-    (z-transforms of the recursions of `coefficients` for steps of one length.) N steps per period correspond to dt =
-    2 pi/(N omega). omega and dt broadcast.
+    With y = exp(i omega dt), and phi_j and q_j as in `physics.body`, the terms of G_inf + sum_j H_j are
+
+        backward Euler:      H_j = G_j (1 - 1/y) / (1 + dt/tau_j - 1/y)
+        exponential-linear:  H_j = G_j phi_j (1 - 1/y) / (1 - exp(-dt/tau_j)/y)
+        exponential:         H_j = G_j (phi_j + q_j (1 - 1/y)) (1 - 1/y) / (1 - exp(-dt/tau_j)/y)
+
+    These are z-transforms of the recursions of `coefficients` for steps of one length. N steps per period correspond to
+    dt = 2 pi/(N omega). omega and dt broadcast.
     """
     spring, terms, times = normal_form(*material)
     omega, dt = (np.asarray(value, float)[..., None] for value in (omega, dt))
@@ -180,10 +185,10 @@ class Advance(NamedTuple):
 
 
 def coefficients(prony: Prony, integrator: str, dt: float, growth: float = 0.0) -> Advance:
-    """Return the coefficients of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes.
+    """Return the coefficients of each branch over a step dt [s]; dt = 0 is a jump, in which nothing relaxes.
 
-    `growth` is dt divided by the length of the step before, 0 if the displacement was not smooth. With `growth` > 0 the
-    exponential integrator takes u as quadratic in time (`physics.body`), else as linear.
+    `growth` is dt divided by the length of the step before; `growth` is 0 after a jump and in the first step of a
+    stage. With `growth` > 0 the exponential integrator takes u as quadratic in time (`physics.body`), else as linear.
     """
     z = elapsed(prony, dt)
     if integrator == "backward-euler":
@@ -205,12 +210,12 @@ def bend(z: ArrayLike) -> Array:
 
 
 def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
-    """Return the creep compliance of a relaxation function, by partial fractions of 1/Gbar.
+    """Return the creep compliance of a relaxation function.
 
-    Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, with one lambda_i above every
-    relaxation time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. Each zero is
-    found by the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the
-    times are.
+    The compliance follows by partial fractions of 1/Gbar, with Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j). Gbar
+    is zero at s = -1/lambda_i, where J_i = -1/(s Gbar'(s)). One lambda_i lies between each relaxation time and the
+    next, and one above the last; the latter is infinite if G_inf = 0, and the body flows. Each zero is found by the
+    logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times are.
     """
     series = normal_form(*material)
     spring, terms, times = series
@@ -228,8 +233,8 @@ def creep(t: ArrayLike, *material: *Moduli) -> Array:
 
 
 class Zero(NamedTuple):
-    """Zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda), a retardation time [s], all tau_k - lambda [s], and
-    df/dlambda [Pa/s]."""
+    """A zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda): its value `time`, which is a retardation time [s];
+    the differences tau_k - lambda [s] for all k; and the slope df/dlambda [Pa/s]."""
 
     time: float
     distances: Array
@@ -237,7 +242,7 @@ class Zero(NamedTuple):
 
 
 def retardation(series: Prony) -> list[Zero]:
-    """Return the zeros of a series in normal form, one above each relaxation time; if the series has no spring, the
+    """Return the zeros for a series in normal form, one above each relaxation time. If the long-term modulus is 0, the
     last zero is infinite and omitted."""
     return [_zero_above(index, series) for index in range(series.moduli.size - (series.modulus_inf == 0))]
 
@@ -281,10 +286,12 @@ INSTANT = 30.0  # accuracy: m above which a wave has no memory, over 1/sqrt(shor
 
 @dataclass(frozen=True)
 class Exponentials:
-    """The sum of exponentials (1) for times from `shortest` to `longest` [s], with a relative error of at most `bound`.
+    """The sum of exponentials (1) of the module for times from `shortest` to `longest` [s], with a relative error of at
+    most `bound`.
 
-    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` waves have a memory; all later
-    ones follow the present heat. Waves above `end` [s^(-1/2)] are neglected. `first` and `spacing` are m_0 and h.
+    `rates` m^2 [1/s] and `weights` [s^(-1/2)] belong to all waves. Only the first `kept` waves have a memory; the
+    others are in equilibrium with the present heat. Waves above `end` [s^(-1/2)] are neglected. `first` and `spacing`
+    are m_0 and h.
     """
 
     rates: slab_Array
@@ -316,7 +323,8 @@ def fit_exponentials(shortest: float, longest: float, error: float) -> Exponenti
 
 
 def shares_of_step(x: slab_Array) -> tuple[slab_Array, slab_Array]:
-    """Return the weights, per dt, of the heat before and after a step `x = rate dt`, for heat linear in time."""
+    """Return the weights, divided by dt, of the heat before a step and of the heat after it, for heat linear in time.
+    `x` is the length dt of the step times the rate, any shape."""
     small = np.minimum(x, 1e-3)
     safe = np.maximum(x, 1e-3)
     mean = np.where(x < 1e-3, 1.0 - small / 2 + small**2 / 6 - small**3 / 24, -np.expm1(-safe) / safe)

@@ -1,9 +1,9 @@
 """Records of a run: measures of an instant and certificates of solves, and entries of checkpoints with their units.
 
-Only numpy is imported, so that this file is read quickly.
+This file imports only numpy, so that it is imported quickly.
 
-Each part of a run (`RunPart`) returns its memory before the first step, the checkpoint entries of a memory, and the
-memory that saved entries describe, on any number of ranks. `march.state.parts_of` lists all parts.
+Each part of a run (`RunPart`) returns its memory before the first step, returns the checkpoint entries of a memory,
+and restores a memory from saved entries, on any number of ranks. `march.state.parts_of` lists all parts.
 
 In the units of a run all numbers are dimensionless. The units are powers of two: conversion is exact, and a checkpoint
 in SI units restarts bit for bit.
@@ -25,24 +25,32 @@ SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per si
 def excess_of(dx: float, dy: float, edges_follow_grid: bool = False) -> float:
     """Return by how many cells the counted contact area is too large, per cell side on the edge of contact.
 
-    The excess is SIDE on square cells, and if `edges_follow_grid`. On long cells it is smaller, as edges of contact run
-    rather along the longer sides: SIDE times (shorter/longer of dx and dy) to the power LONG_CELLS.
+    The excess is SIDE on square cells, and on all cells if `edges_follow_grid`. On long cells the excess is smaller, as
+    edges of contact run rather along the longer sides: SIDE times (shorter/longer of dx and dy) to the power
+    LONG_CELLS.
     """
     return SIDE if edges_follow_grid else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of a contact at one instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; areas are
-    shares of the nominal area.
+    """Measures of a contact at one instant. Areas are shares of the nominal area.
 
-    `contact_area` counts the points with pressure. `contact_area_corrected` subtracts the excess along edges of
-    contact. The correction holds on average for edges in all directions that are smooth on the scale of a cell:
+    * pressure, max_pressure [Pa]: the mean over the box, and the largest value;
+    * normal_force, force_x, force_y [N]: forces on the rigid surface. The tangential forces include the friction of the
+      interface;
+    * friction: tangential force divided by normal force, 0 without a compressive load;
+    * force_interface [N], friction_interface: the parts of the tangential force and of `friction` from the interface;
+    * approach, mean_gap [m]: approach of the rigid surface, and the mean of the gap over the box;
+    * contact_area: share of the points with pressure;
+    * contact_area_corrected: `contact_area` without the excess along edges of contact;
+    * spared: share of the area that is not subtracted because points on the edge have yielded;
+    * straight: 1 if all edges of contact are parallel to one axis of the grid, 0 if equal lengths of the edges are
+      parallel to x and to y, as in round spots;
+    * at_edge: True if an isolated contact reaches the edge of the box.
+
+    The correction of the area holds on average for edges in all directions that are smooth on the scale of a cell:
     spheres, and rough surfaces whose shortest wave has at least 4 cells. The edge of the box is not an edge of contact.
-    `spared` is the share that is not subtracted because points on the edge have yielded. `straight` is 1 if all edges
-    of contact are parallel to one axis of the grid, and 0 if equal lengths are parallel to x and y, as of round spots.
-    `at_edge`: an isolated contact reaches the edge of the box. Forces and `friction` include the interface, whose part
-    is `force_interface` and `friction_interface`. Friction is 0 without a compressive load.
     """
 
     pressure: float = 0.0
@@ -75,19 +83,20 @@ class Measures:
 
 @dataclass(frozen=True)
 class Certificate:
-    """Errors of a returned pressure, computed from this pressure alone and without unit.
+    """Errors of a returned pressure, without unit. They are computed from this pressure alone.
 
     * complementarity: `sum(p |g|)/(L sum(p))`;
-    * penetration: `max(-g, 0)/L` over all points;
+    * penetration: the largest `max(-g, 0)/L` of all points;
     * load: `|mean(p)/P0 - 1|`, 0 under a given approach;
-    * members: share of points with pressure or penetration;
+    * members: share of the points that have pressure or penetration;
     * length: L, the standard deviation of the displacement u in the contact, weighted by the pressure,
 
-        L^2 = <p, u^2>/<p> - (<p, u>/<p>)^2,
+        L^2 = <p, u^2>/<p> - (<p, u>/<p>)^2.
 
-    at least LEAST_SHARE of the mean `<p, u>/<p>`, for contacts of one or two points, and at most the height of the
-    surface. L does not depend on the size of the box. In steady sliding along lines of points, waves that do not vary
-    along the lines may have a far lower modulus, and most of the displacement (`contact.certificate.Lines`).
+    L is at least LEAST_SHARE of the mean `<p, u>/<p>`, which matters for contacts of one or two points, and at most the
+    height of the surface. L does not depend on the size of the box. In steady sliding along lines of points, waves that
+    do not vary along the lines may meet a far lower modulus and make most of the displacement
+    (`contact.certificate.Lines`).
     """
 
     complementarity: float
@@ -137,10 +146,11 @@ Memory = TypeVar("Memory")
 
 @dataclass(frozen=True)
 class Entry:
-    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers; times `unit` in SI units.
+    """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers. `unit` is the factor from
+    `value` to SI units, and `symbol` is the name of the SI unit.
 
-    A checkpoint may lack an `optional` entry, which `restored` then replaces. A `given` entry follows from the job: it
-    is not restored, and a checkpoint with another value is refused.
+    A checkpoint may lack an `optional` entry, which `restored` then replaces. A `given` entry follows from the job: its
+    value is not restored, and a checkpoint with another value is refused.
     """
 
     value: NDArray[Any] | float
@@ -172,8 +182,8 @@ class RunPart(Protocol[Memory]):
         """Return the checkpoint entries of a memory by the part's own names; maps are not copied."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`; numbers are arrays in the
-        run's units."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`. Other entries of `saved`
+        are arrays of numbers in the run's units."""
 
 
 def with_part(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:

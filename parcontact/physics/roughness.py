@@ -1,11 +1,13 @@
-"""Random self-affine surfaces from their power spectral density (paper, Eqs. 12 and 13).
+"""Random self-affine surfaces from their power spectral density Phi (paper, Eqs. 12 and 13).
+
+At the wavenumber k [rad/m], with the roll-off k_r, the density [m^4] is
 
     Phi(k) = C                             long-wavelength end <= k < roll-off
              C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
 
-with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from a stream that depends on the seed and
-its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole
-spectrum.
+The transform of the heights h satisfies `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from
+a stream that depends on the seed and on the wavenumber along x: a seed gives the same waves on every grid and any
+number of ranks, and no rank holds the whole spectrum.
 """
 
 from collections.abc import Callable
@@ -26,10 +28,12 @@ EDGE = 1.0 - 1e-9  # accuracy: factor on limits of wavenumbers, against rounding
 
 @dataclass(frozen=True)
 class Roughness:
-    """Parameters of a random surface; lengths in m. One of rms slope, rms height and spectral constant C is given.
+    """Parameters of a random surface; lengths in m. One of `rms_slope`, `rms_height` and `psd_constant` (C of the
+    module, m^4) is given.
 
-    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves along
-    the angle are longer by this ratio than waves across.
+    `stretch` is a ratio and an angle from the x axis [rad]. With the wavenumbers k_along the direction of this angle
+    and k_across, Phi is a function of the length of the vector (ratio k_along, k_across), so that waves along the angle
+    are longer by this ratio than waves across.
     """
 
     hurst: float
@@ -142,8 +146,8 @@ def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
 
 
 def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> float:
-    """Return the wavelength [m] below which waves contribute at most BEYOND of the mean square slope; infinite for a
-    flat map. Arguments are as in `moments`. Collective."""
+    """Return the wavelength [m] below which all waves together have at most the share BEYOND of the mean square slope;
+    infinite for a flat map. Arguments are as in `moments`. Collective."""
     q, power = _powers(spectrum, fft, size)
     low = 2 * np.pi / max(size)
     highest = np.pi * np.hypot(fft.mx / size[0], fft.my / size[1])

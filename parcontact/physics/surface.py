@@ -1,18 +1,19 @@
 """The rigid surface: heights at any position, motion, and tangential forces of the contact.
 
-Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase `exp(-i
-q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is taken as a
-standing wave. Shapes in closed form are evaluated at each position. Each motion is applied to the heights at the
-origin.
+Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase
+`exp(-i q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is
+taken as a standing wave. Shapes in closed form are evaluated at each position. Each motion starts from the heights at
+displacement 0, so that errors do not add up.
 
-Position of the rigid surface: `h(x, t) = h0(x - s(t))`, with s its displacement [m].
+The heights of the rigid surface at the time t are `h(x, t) = h0(x - s(t))`, with s the displacement of the surface
+[m].
 
-Tangential force of a pressure on the surface of the body, `-<p, du/ds>`, the second estimate of friction.
+Friction is computed in two ways. The force on the rigid surface is `-<p, dh/ds>` (paper, Eq. 10); the force of the
+pressure on the surface of the body is `-<p, du/ds>`.
 
-In the continuum this force equals the force on the rigid surface, `-<p, dh/ds>` (paper, Eq. 10), as the gap and its
-slope vanish under pressure. On a mesh the difference of both forces measures the mesh error of friction. On an elastic
-body the force on the body is exactly 0, as the operator A is symmetric and any antisymmetric difference along s
-commutes with it.
+In the continuum both forces are equal, as the gap and its slope are 0 where there is pressure. On a mesh the
+difference of both forces measures the mesh error of friction. On an elastic body the force on the body is exactly 0, as
+the operator A is symmetric and any antisymmetric difference along s commutes with A.
 
 Slopes are differences of the eighth order,
 
@@ -21,14 +22,15 @@ Slopes are differences of the eighth order,
 with an error of 0.03 % for a wave of 8 cells and 3 % for a wave of 4. Unlike slopes of a Fourier series, these
 differences need only points near the contact, in periodic and in free boxes.
 
-Friction of the contact area itself is a shear stress that opposes sliding on all points in contact:
+The contact area itself causes friction, too: a shear stress tau opposes sliding on all points in contact, of area A
+at the velocity v,
 
-    F = -tau A v/|v|,    tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2),
+    F = -tau A v/|v|,    with tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2).
 
-a bell-shaped function of the logarithm of the velocity with its maximum at v_0, shifted by temperature like the bulk
-(B. Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear
-does not move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a coupled
-solve.
+The second form is a bell-shaped function of the logarithm of the velocity with its maximum at v_0, shifted by
+temperature like the bulk. The paper B. Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142
+(2015) 194701 has c for 1/w^2. Shear does not move an incompressible half space along its normal (nu = 1/2), so that
+this friction is added without a coupled solve.
 """
 
 import math
@@ -86,7 +88,7 @@ def _inverse(distance: Array) -> Array:
 
 @dataclass(frozen=True)
 class Conical:
-    """A cone with its tip (0) at the centre."""
+    """A cone with its tip at the centre, where the height is 0; `steepness` is the slope of its side."""
 
     steepness: float
     centre: tuple[float, float]
@@ -101,8 +103,8 @@ class Conical:
 
 @dataclass(frozen=True)
 class Pyramidal:
-    """A square pyramid with its tip (0) at the centre and sides along x and y; on its edges the slope is the mean of
-    the slopes of both faces."""
+    """A square pyramid with its tip at the centre, where the height is 0, and sides along x and y. `steepness` is the
+    slope of its faces; on the edges between two faces the slope is the mean of the slopes of both."""
 
     steepness: float
     centre: tuple[float, float]
@@ -117,7 +119,7 @@ class Pyramidal:
 
 @dataclass(frozen=True)
 class FlatEnded:
-    """A round punch: a flat face (height 0) with a `radius`, and a parabola around it with the curvature radius
+    """A round punch: a flat face of height 0 and of this `radius`, and around the face a parabola of curvature radius
     `edge`."""
 
     radius: float
@@ -136,7 +138,8 @@ class FlatEnded:
 
 @dataclass(frozen=True)
 class Round:
-    """A sphere, or a cylinder along x or y, with its top (height 0) at the centre; a parabola, or `exact` circle."""
+    """A sphere, or a cylinder along x or y, with its top at the centre, where the height is 0. The profile is a
+    parabola of curvature radius `radius`, or a circle if `exact`."""
 
     radius: float
     centre: tuple[float, float]
@@ -162,9 +165,9 @@ Indices = NDArray[np.intp]
 class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
-    `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`), or None.
-    `periodic` wraps the shapes around the box along x and y; `scale` converts m to the unit of heights; heights are
-    relative to `datum` [m].
+    `waves` is this rank's part of the transform of the periodic heights, or of the lowest waves of this transform
+    (`loops.lowest`); None without periodic heights. If `periodic` along x or y, the shapes repeat in this direction
+    with the length of the box. `scale` converts m to the unit of heights; heights are relative to `datum` [m].
     """
 
     slab: Slab
@@ -187,7 +190,8 @@ class Surface:
         self.scale = 1.0 / unit
 
     def level(self) -> None:
-        """Shift the datum of heights to the mean of the waves, as a large constant costs digits; collective."""
+        """Shift the datum of heights to the mean of the waves, because a large mean would cost digits of the heights;
+        collective."""
         if self.waves is not None:
             owner = self.fft.columns.start == 0 < self.fft.columns.stop
             mean = self.slab.sum(float(self.waves[0, 0].real) if owner else 0.0)[0] / (self.fft.mx * self.fft.my)
@@ -209,8 +213,9 @@ class Surface:
         return out
 
     def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
-        """Return the sums over all points of pressure times slope along x and y; collective. These are the forces of
-        Eq. 10 of the paper divided by the area of a cell; slopes are in the unit of heights per m."""
+        """Return the sums over all points of pressure times slope, along x and along y; collective. The sums are the
+        forces on the rigid surface (paper, Eq. 10) divided by the area of a cell: a positive sum pushes the surface
+        along +x or +y. Slopes are in the unit of heights per m."""
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)
@@ -382,7 +387,8 @@ PARTS = 10**9  # accuracy: positions are rounded to this fraction of a cell
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
-    """Return the numbers of cells, along x and y, by which the surface moves between two displacements [m]."""
+    """Return the numbers of cells along x and y, not always whole, by which the surface moves from the displacement
+    `old` to `new` [m]; negative for motion along -x or -y."""
     return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
 
 
@@ -414,9 +420,11 @@ class AnyFraction:
 
 
 class AlongX:
-    """Motion along x on a periodic box, by whole cells or (PARTS) by parts of a cell.
+    """Motion along x on a periodic box, rounded to multiples of 1/`parts` of a cell: `parts` is 1 for whole cells, or
+    PARTS.
 
-    Motion by whole cells is an index offset; the map is computed again when the fraction of a cell has changed.
+    Motion by whole cells is an index offset; the map is computed again only when the remaining fraction of a cell has
+    changed.
     """
 
     def __init__(self, surface: Surface, parts: int = 1) -> None:
@@ -440,9 +448,10 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 def friction_by_energy(
     slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: tuple[bool, bool]
 ) -> float:
-    """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective. The unit of the result is the
-    unit of `u` divided by the unit of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or rows continue
-    beyond the edge."""
+    """Return the coefficient of friction `-<p, du/ds>/<p, 1>`, where s is the coordinate along the unit vector
+    `direction`; collective. Heights u and lengths of `cell = (dx, dy)` may have two units; the unit of the result is
+    the unit of u divided by the unit of lengths. Beyond an edge where the box is not `cyclic`, u keeps its value at the
+    edge."""
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
         nothing = np.empty((0, slab.nx), u.dtype)
@@ -510,8 +519,9 @@ class Shear(Protocol):
 
 @dataclass(frozen=True)
 class InterfaceFriction:
-    """Shear stress of the contact area: `shear_stress` [Pa] is its largest value. A bell has its maximum at `velocity`
-    [m/s], its `width` [decades], and the shift factor a_T (`shift`)."""
+    """Shear stress of the contact area. If `velocity` is None, the stress is `shear_stress` [Pa] at any speed.
+    Otherwise the stress is the bell of the module, with the maximum `shear_stress` at `velocity` [m/s], the `width` w
+    [decades], and the factor `shift` (a_T)."""
 
     shear_stress: float
     velocity: float | None = None

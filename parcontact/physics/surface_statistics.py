@@ -1,10 +1,11 @@
 """Statistics of a map: spectra, rms values, Nayak's parameter, the Hurst exponent of a self-affine range.
 
-    C2(q) = <|h^(q)|^2>/(Lx Ly)/(4 pi^2)   over directions, with h^ = int h exp(-i q x) d2x,   <h^2> = int C2 d2q,
-    C1(q) along one direction, one-sided: <h^2> = int_0^inf C1 dq.
+    C2(q) = <|h^(q)|^2>/(Lx Ly)/(4 pi^2)   averaged over directions, with h^ = int h exp(-i q x) d2x,
+    C1(q) along one direction, one-sided,  so that <h^2> = int C2 d2q = int_0^inf C1 dq.
 
-(B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398;
-T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, whose C2 is 4 pi^2 times ours.)"""
+(B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398; T. D.
+B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, in which C2 is defined 4 pi^2 times as
+large as here.)"""
 
 import math
 from dataclasses import dataclass
@@ -26,9 +27,11 @@ FLAT, STEEP = -2.0, -4.2  # physics: slopes of log C2 for Hurst exponents 0, and
 class Statistics:
     """Statistics of a periodic map of (ny, nx) points on a box of (lx, ly) [m].
 
-    Rms height [m], slope [-], and curvature [1/m], which is half of the Laplacian; Nayak's parameter; `q`, shape (n,)
-    [1/m], with `psd_2d` [m^4]; spectra along x and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`. `hurst` with the standard
-    error `hurst_error` is NaN if no power law fits.
+    * rms_height [m], rms_slope, and rms_curvature [1/m], where the curvature is half of the Laplacian;
+    * nayak: Nayak's parameter;
+    * q [rad/m], psd_2d [m^4]: wavenumbers, and the spectrum C2 of the module, both of shape (n,);
+    * qx, qy [rad/m], psd_x, psd_y [m^3]: wavenumbers along x and y, and the spectra C1 along x and y;
+    * hurst, hurst_error: Hurst exponent and its standard error, NaN if no power law fits.
     """
 
     rms_height: float
