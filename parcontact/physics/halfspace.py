@@ -493,9 +493,10 @@ class HalfSpace:
         half space is free.
 
         The first operator takes pressure to displacement. The second operator is the inverse of the first, but takes a
-        uniform displacement to 0. The first number is the displacement under a uniform unit pressure, which may be 0.
-        The second number replaces the first in the symbol of the first operator, and is positive where the first number
-        is 0. A free body is replaced by a periodic body with the same influence coefficients up to half the box.
+        uniform displacement to 0. The first number is the displacement under a uniform unit pressure, which is 0 for
+        some bodies. The second number is the displacement that the first operator uses instead: the first number, or a
+        positive value if the first number is 0. A free body is replaced by a periodic body with the same influence
+        coefficients up to half the box.
         """
         if self.free:
             table = tabulate(fft, self.size, self.response.coefficient, self.other is None).real

@@ -22,10 +22,10 @@ Slopes are differences of the eighth order,
 with an error of 0.03 % for a wave of 8 cells and 3 % for a wave of 4. Unlike slopes of a Fourier series, these
 differences need only points near the contact, in periodic and in free boxes.
 
-The contact area itself causes friction, too: a shear stress tau opposes sliding on all points in contact, of area A
-at the velocity v,
+The contact area itself causes friction, too: a shear stress tau opposes sliding on all points in contact. With the
+contact area A_c and the velocity v, the force is
 
-    F = -tau A v/|v|,    with tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2).
+    F = -tau A_c v/|v|,    with tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2).
 
 The second form is a bell-shaped function of the logarithm of the velocity with its maximum at v_0, shifted by
 temperature like the bulk. The paper B. Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142
