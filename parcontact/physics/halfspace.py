@@ -10,7 +10,7 @@ each cell, and the displacement at cell centres. The mean displacement of a peri
 0. For another body, the symbol is multiplied by the ratio of its compliance to that of the half space (`Response`).
 
 A pressure wave `exp(i q x)` that moves with the surface at the velocity vector v loads a point of a viscoelastic
-body at the angular frequency `-q v`, so that in the frame of the surface
+body at the angular frequency `-q v`. In the frame of the surface,
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
@@ -121,15 +121,14 @@ def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array
     """Return the factor by which the kernel `love` multiplies the symbol of the kernel `spectral`, for each wavenumber
     of `rows` of a spectrum; accurate to 14 digits.
 
-    `size` is the size of the box. A wave of pressures that are constant on each cell contains all aliases of its
-    wavenumber, each with the form factor of the cell. So the factor is
-    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
+    A wave of pressures that are constant on each cell contains all aliases of its wavenumber, each with the form factor
+    of the cell. So the factor is `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice
+    Q of the grid on the box of `size`. With
 
         1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
 
-    the sums over Qx and Qy separate, and the integral is one product of matrices. The integral over t is computed by
-    double exponential quadrature (H. Takahasi and M. Mori, Publ. RIMS 9 (1974) 721), from lengths far below a cell to
-    lengths far beyond the box.
+    the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
+    Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) covers t from far below a cell to far beyond the box.
     """
     qx, qy = wavenumbers(fft, size, rows)
     dx, dy = size[0] / fft.mx, size[1] / fft.my
@@ -322,9 +321,8 @@ UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as 
 
 @dataclass(frozen=True)
 class Response:
-    """Response of the surface of a body of shear modulus 1 to pressure. This class is the response of a half space;
-    effects may return a subclass for another body (`effects.effect.Effect`). Wavenumbers q are in 1/length for one unit
-    of length; arrays have any shape."""
+    """Response of the surface of a body of shear modulus 1 to pressure, here of a half space; effects may return a
+    subclass for another body (`effects.effect.Effect`). Wavenumbers q are in 1/length; arrays have any shape."""
 
     thickness: float = math.inf
     poisson: float = field(default=0.5, kw_only=True)
@@ -335,8 +333,7 @@ class Response:
         return 0.0
 
     def compliance_ratio(self, q: Array) -> Array | float:
-        """Return the displacement under waves of pressure of wavenumbers q, divided by the displacement of a half
-        space."""
+        """Return the displacement under waves of pressure, divided by that of a half space."""
         return 1.0
 
     def compliance(self, q: Array) -> Array:
@@ -356,8 +353,7 @@ class Response:
         return love(x, y, dx, dy, self.poisson)
 
     def reach(self, size: Vector) -> float:
-        """Return the distance [length] beyond which points of a box hardly act on each other: infinite for a half
-        space."""
+        """Return the distance [length] beyond which points of a box hardly act on each other."""
         return math.inf
 
     def preconditioner(self, size: Vector) -> Callable[..., Any] | None:
@@ -371,12 +367,11 @@ class HalfSpace:
     """A half space of shear modulus 1, loaded inside a box of `size = (lx, ly)` [any unit of length].
 
     The box is periodic, with the `kernel`, unless it is `free`. Nothing surrounds a free box, and the coefficients are
-    Love's. A free box that `repeats_along_x` is periodic along x only. `other` is the response of a body that is no
-    half space. `factors` is None for a linear body; otherwise it is a function of wavenumbers that returns two factors
-    for each, on the storage and on the loss modulus in steady sliding.
-
-    The argument `fft` of methods is the transform of maps: operators compute in its precision. Symbols have the shape
-    of its spectrum, or of the `rows` of the spectrum. A free half space makes a padded transform for each operator.
+    Love's; a free box that `repeats_along_x` is periodic along x only. `other` is the response of a body that is no
+    half space. `factors` is None for a linear body, or a function of wavenumbers that returns two factors for each, on
+    the storage and on the loss modulus in steady sliding. The argument `fft` of methods is the transform of maps:
+    operators compute in its precision, and symbols have the shape of its spectrum, or of the requested `rows`. A free
+    half space makes a padded transform for each operator.
     """
 
     size: Vector
@@ -394,8 +389,8 @@ class HalfSpace:
 
     @property
     def moves_in_the_mean(self) -> bool:
-        """True if a uniform pressure moves the surface. False for a periodic half space, and for another periodic body
-        that is incompressible."""
+        """True if a uniform pressure moves the surface: not for a periodic body that is a half space or
+        incompressible."""
         return self.free or self.response.mean_compliance > 0.0
 
     # -- elastic ------------------------------------------------------------------------------------------------------
@@ -409,12 +404,9 @@ class HalfSpace:
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space. The factor of the
-        kernel `love` is not included.
-
-        At q = 0, where a periodic half space has no inverse, the ratio at the wavenumber of the box is used, so that
-        the symbol is positive everywhere.
-        """
+        """Return pressure divided by displacement of each wave, `|q|/(1 - nu)` on a half space, for either kernel. At q
+        = 0, where a periodic half space has no inverse, the ratio at the wavenumber of the box makes the symbol
+        positive."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
         return self.response.stiffness(q)
@@ -434,8 +426,8 @@ class HalfSpace:
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Return the lengths (along x, along y) of the padded transform of an operator for maps of `points = (nx, ny)`;
-        None if the operator uses the transform of the maps."""
+        """Return the lengths along x and y of an operator's padded transform for maps of `points = (nx, ny)`; None if
+        the operator uses the transform of the maps."""
         if not self.free:
             return None
         lengths = padded_lengths(*points)
@@ -525,9 +517,8 @@ class HalfSpace:
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
-        """Return a function of rows of the spectrum, which returns the modulus G*(-q v) of each wave of these rows.
-        Each modulus is multiplied by the `factors`. At a Nyquist wavenumber, which has two signs, the modulus is the
-        mean for both signs.
+        """Return a function of rows of the spectrum, which returns the modulus G*(-q v) of each wave of these rows,
+        times the `factors`. At a Nyquist wavenumber, which has two signs, the modulus is the mean for both signs.
 
         The moduli broadcast to the rows: without factors, and under a surface that slides along x, all rows are equal
         and the function returns one row.
@@ -576,8 +567,7 @@ class HalfSpace:
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
-        """Return the operator from pressure to the map h_k of branch `k`, an index of `prony`, of a free body;
-        collective.
+        """Return the operator from pressure to the map h_k of branch `k` of `prony`, of a free body; collective.
 
         In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has the poles of the creep function only: each
         term i of the creep function is multiplied by the response of the branch at `s = -1/l_i`.
