@@ -160,9 +160,10 @@ class _Coefficients:
 class ZenerBody:
     """A body whose relaxing branches are the terms of `prony`.
 
-    `kept`, `memoryless`, `frozen` and `moving` are lists of indices of terms. Each branch of `kept` has a map, in the
-    order of this list; `memoryless` and `frozen` branches (`physics.body`) have none. `moving` has all branches that
-    are not frozen. `shortest_time` [s] is the shortest relaxation time of the branches in `kept`.
+    Branches are given by their indices in `prony`. The arguments `memoryless` and `frozen` are the branches of these
+    two kinds (`physics.body`), which have no map. Each branch of the list `kept` has a map, in the order of this list.
+    The list `moving` has all branches that are not frozen. `shortest_time` [s] is the shortest relaxation time of the
+    branches in `kept`.
     """
 
     def __init__(

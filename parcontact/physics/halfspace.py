@@ -389,8 +389,8 @@ class HalfSpace:
 
     @property
     def moves_in_the_mean(self) -> bool:
-        """True if a uniform pressure moves the surface: not for a periodic body that is a half space or
-        incompressible."""
+        """True if a uniform pressure moves the surface. False for a periodic half space and a periodic incompressible
+        body."""
         return self.free or self.response.mean_compliance > 0.0
 
     # -- elastic ------------------------------------------------------------------------------------------------------
