@@ -55,8 +55,8 @@ class WaveSpectrum:
         return 2.0 * np.pi / self.longest, 2.0 * np.pi / self.shortest
 
     def moment(self, low: float, high: float, power: int) -> float:
-        """Return `int Phi k^(1 + power) dk/(2 pi)` between two wavenumbers [rad/m]: the mean square height [m^2] for 0,
-        the mean square slope for 2."""
+        """Return `int Phi k^(1 + power) dk/(2 pi)` between two wavenumbers [rad/m], on profiles one factor k less. The
+        result is the mean square height [m^2] for the power 0, and the mean square slope for 2."""
         step = np.log(high / low) / POINTS
         k = low * np.exp(step * (np.arange(POINTS) + 0.5))
         return float(np.sum(self.phi(k) * k ** (power + 2 - self.line)) * step / (2.0 * np.pi))

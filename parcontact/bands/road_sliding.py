@@ -63,8 +63,9 @@ class BandOutcome:
         """Absolute errors of the method in friction and in the corrected area; 0 if there is only one band.
 
         Each is a share of the difference between the results with and without the closing of finer bands. The least
-        relative error is LEAST_METHOD, which falls to 0 near full contact. For the area it is at least LEAST_OF_AREA
-        times the open share of the area. `memory` is added to the error of friction."""
+        relative error of friction is LEAST_METHOD, and falls to 0 near full contact. The least relative error of the
+        area is the same, or LEAST_OF_AREA times the open share of the area if this is larger. `memory` is added to the
+        error of friction."""
         if len(self.results) == 1:
             return [0.0, 0.0]
         open_share = 1.0 - self.results[-1].contact_area_corrected
@@ -93,7 +94,7 @@ class BandLoop(Protocol):
 
     def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
         """Return True if the next round would change nothing for the effect. `changes` are the relative changes of
-        friction and area in the round; `others` is True if all loops that come earlier in the round settle."""
+        friction and area in the round; `others` is True if all loops that are earlier in the round settle."""
 
     def move(self, road: "RoadSliding", results: Results) -> None:
         """Choose what the effect changes in the next round; raises RunError."""
