@@ -1,1 +1,1 @@
-"""From a job to its steps in time or to steady sliding: objects of the calculation, decisions, and error estimates."""
+"""Calculate a job, in steps of time or in steady sliding: choices, objects of the calculation, and estimated errors."""

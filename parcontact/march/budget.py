@@ -16,14 +16,14 @@ time: from the distance by which spots of contact, or waves of the surface, pass
 (`time_error`). folded: the bound on the errors of friction by the branches without a map; the error of the area is this
 bound times the share of the box that is not in contact.
 
-mesh: for the area AREA c/N^(1/4) while the surface slides and errors of its positions average out; at rest and in
-steady sliding with STILL instead of AREA, and at least one cell. For friction in a march, VIEWS times the difference
-between friction by the slopes of the rigid surface and by the slopes of the body. For steady friction, a sum of squares
-without cancellation, the loss at edges in waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts
-have the same position on the grid: their errors do not average out (N = 1), and are larger by IDENTICAL for the area
-and for steady friction. Edges along an axis of the grid also have one position: c counts as much more where all edges
-follow it, and in proportion where some do. A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with
-a further error of friction WAVES (4/cells)^2.5.
+mesh: the error of the area is AREA c/N^(1/4) while the surface slides, as errors of its positions average out, and
+STILL c/N^(1/4) at rest and in steady sliding; it is at least the area of one cell. For friction in a march, VIEWS times
+the difference between friction by the slopes of the rigid surface and by the slopes of the body. For steady friction, a
+sum of squares without cancellation, the loss at edges in waves shorter than the cells, and STEADY_AREA c/N^(1/4).
+Identical contacts have the same position on the grid: their errors do not average out (N = 1), and are IDENTICAL times
+as large for the area and for steady friction. Edges along an axis of the grid also have one position: if all edges
+follow the axis, errors are also IDENTICAL times as large; if a share does, they grow in proportion to this share. A map
+lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction WAVES (4/cells)^2.5.
 
 Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
 waves of wavenumber q across the edge falls as q^-3. In steady sliding at the speed v these waves lose power in
@@ -259,8 +259,8 @@ class ErrorParts(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The stated error of friction: at least 1 if the sum exceeds UNKNOWN, since such a friction is the small
-        difference of large forces, and only the order of magnitude of its error is known."""
+        """The stated relative error of friction. If the sum of the parts exceeds UNKNOWN, it is at least 1: friction is
+        then a small difference of large forces, and only the order of magnitude of its error is known."""
         return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     def plain(self) -> dict[str, float]:
@@ -273,7 +273,8 @@ NAMES = ErrorParts._fields
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Errors at one instant. `friction` is None without friction; its error may exceed 1. No errors are stated unless
+    """Errors at one instant. `friction` has the relative errors of friction, in sum possibly above 1, and is
+    None without friction; `area` has the relative errors of the area. No errors are stated unless
     the mesh is `resolved`: spots of contact have more than a few cells."""
 
     friction: ErrorParts | None
@@ -353,7 +354,8 @@ class ErrorSums:
     sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
 
     def plus(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> "ErrorSums":
-        """Return the sums with one more step of `seconds`, in which the surface slid by `slid` [m]."""
+        """Return the sums with one more step of the length `seconds` [s] and the friction coefficient `friction`, in
+        which the surface slid by `slid` [m]."""
         far, sums = weight_of(slid, seconds), self.sums.copy()
         for row, parts, weight in zip(sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
@@ -361,7 +363,7 @@ class ErrorSums:
         return ErrorSums(sums)
 
     def entries(self) -> dict[str, Entry]:
-        """Return the checkpoint entry of the sums, which is optional."""
+        """Return the checkpoint entry of the sums; a checkpoint without this entry can be read, too."""
         return {SUMS: Entry(self.sums.ravel(), optional=True)}
 
     @classmethod
@@ -393,7 +395,8 @@ class ErrorSums:
         return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: Any) -> dict[str, Any]:
-        """Return the requested `accuracy` and the relative errors, by source and in total, as plain data."""
+        """Return the requested `accuracy` and the relative errors of friction and area, by source and in total, as
+        plain data."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: each.plain() for name, each in found.items() if each is not None}
         if self.friction is not None:
@@ -402,7 +405,8 @@ class ErrorSums:
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
         """Return sentences for run.log, with a remedy if the error of friction or area exceeds the requested accuracies
-        `asked`. `chosen` names the sources whose settings the program has chosen by the accuracy."""
+        `asked`. `chosen` names the sources of error that depend on a setting which the program has chosen by the
+        accuracy."""
         found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [

@@ -1,8 +1,8 @@
-"""Choices that follow from a job alone, each made once: which effects are on, why, and what they need.
+"""Choices for a run that follow from its job alone: which effects are on, for which reason, and with which parameters.
 
-`scene.py` makes the objects chosen here, and `parcontact plan` prints the choices; code in other rooms does not see the
-job. An effect that is off allocates nothing, calls nothing and writes nothing. Each decision is a method of `Choices`
-that returns a verdict, and is called once.
+`scene.py` makes the objects chosen here, and `parcontact plan` prints the choices. The solver and the operators do not
+read the job. An effect that is off allocates nothing, calls nothing and writes nothing. Each decision is a method of
+`Choices` that returns a verdict, and is called once.
 """
 
 from collections.abc import Callable

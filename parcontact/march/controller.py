@@ -1,13 +1,15 @@
 """The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
 
-**Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may use a larger
-tolerance, as long as the estimated error of the solver stays below OF_SOLVER of the accuracy of friction and
-OF_SOLVER_IN_AREA of that of the area, or of the other parts of the budget if these are larger. Errors are proportional
-to the certificate of a solve. The factor of the tolerance is a mean over the last steps, rounded to a power of the
-square root of two against rounding errors. It is a part of the state, so that a restarted run continues identically.
-The last solve before a change of velocity or load, and a steady start, have a small tolerance: the body remembers the
-error of the displacement, and a much larger modulus may multiply this error after the change. The last step of a stage
-has a worse start than the steps from which the factor was learnt, as it seldom moves the surface by whole cells.
+**Tolerance.** `numerics.tolerance` is small enough for the scenes in which friction depends most on the solver. If
+`numerics.accuracy` has chosen this tolerance, solves may use a larger one. The estimated error of the solver must stay
+below OF_SOLVER times the accuracy of friction, and below OF_SOLVER_IN_AREA times the accuracy of the area. If the other
+parts of the error budget exceed the accuracy, the same shares of these parts are the limits. Errors are proportional to
+the certificate of a solve. The factor of the tolerance is a mean over the last steps. It is set to a power of the
+square root of two, so that rounding errors do not change it, and belongs to the state, so that a restarted run
+continues identically. The last solve before a change of velocity or load, and a steady start, have a small tolerance:
+the body remembers the error of the displacement, and a much larger modulus may multiply this error after the change.
+The last step of a stage seldom moves the surface by whole cells, so that its solve has a worse start than the steps
+from which the factor was learnt.
 
 **Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is OF_STEPS of the
 accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1 for backward Euler),
@@ -68,8 +70,8 @@ class IntegratorDifference:
     """Result of the embedded pair for one step. All rms values are weighted by the pressure.
 
     `difference` is relative, and grows with the step length to the power `order`. `slope` is the rms slope of the
-    surface along x, in units of heights per unit of length. `angle` is the rms change of the displacement in the step
-    divided by the standard deviation of heights: in full contact the angle by which a wave turns.
+    surface along x, as the run's unit of height per its unit of length. `angle` is the rms change of the displacement
+    in the step divided by the standard deviation of heights: in full contact the angle by which a wave turns.
     """
 
     difference: float
@@ -193,7 +195,7 @@ SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
 
 @dataclass(frozen=True)
 class StepTolerance:
-    """Memory of the tolerance of solves: log2 of the ratio to the job's tolerance, as a mean over the last steps."""
+    """Memory of the tolerance of solves: the mean, over the last steps, of log2(allowed tolerance/job's tolerance)."""
 
     mean: float = 0.0
 
@@ -215,8 +217,8 @@ class TolerancePart:
 class Controller:
     """Controller of the tolerances and the lengths of steps in a run.
 
-    `timeline` has the stages of the `job`; `energies` is True if the job asks for energies, `exact` if contacts are
-    solved to the job's tolerance.
+    `timeline` has the stages of the `job`. `energies` is True if the job asks for energies. `exact` is True if all
+    contacts must be solved to the job's tolerance, whatever the error budget allows.
     """
 
     job: Job
@@ -238,8 +240,8 @@ class Controller:
 
     @cached_property
     def follows(self) -> bool:
-        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen it, and stages have
-        steps."""
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen it, at least one
+        stage has steps, and the run is not `exact`."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
@@ -291,12 +293,13 @@ class Controller:
         front: float = 0.0,
         begins: bool = False,
     ) -> Step | MadeStep:
-        """Return a shorter step to try instead of a step with this error, or the record of the accepted step.
+        """Return a shorter step to try if the error of a step is too large, else the record of the accepted step.
 
-        The step ends at `end` [s] of the stage; `rejected` is True if a longer step was tried before. Under attraction
-        the edge of contact has moved by `front` half process zones; one is allowed, unless it snaps, and the square
-        root of the accuracy in a run with energies. Steps in which a contact snaps, `begins` or ends are limited to a
-        share of the shortest relaxation time, so that a jump meets the body before it relaxes.
+        The step ends `end` [s] after the start of the stage. `rejected` is True if a longer step was tried before.
+        Under attraction the edge of contact has moved by `front` half process zones. The edge may move by one half
+        zone; for a relaxing body with energies, by the square root of the accuracy times a half zone. `begins` is True
+        if a contact begins or ends. Neither needs a step shorter than SNAP_SHARE of the longest step of the stage, or
+        than RELAXING times the shortest relaxation time: in such a step a jump meets the body before the body relaxes.
         """
         order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
         ratio = error / (OF_STEPS * self.asked.of_steps)
@@ -315,8 +318,9 @@ class Controller:
         return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
     def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
-        """Return the record of a step of length dt, with a next step that changes the mean traction by at most the root
-        of the accuracy times its bound. In the step the traction has changed by the share `turned` of its bound."""
+        """Return the record of a step of length dt with a limit on the next step: the mean traction may change by at
+        most the root of the accuracy times its largest value. In this step the traction has changed by `turned` times
+        that value."""
         most = math.sqrt(self.asked.of_steps)
         if turned * made.next <= most * dt:
             return made
@@ -419,8 +423,8 @@ class Controller:
 
 
 def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
-    """Return the largest tolerance of the solve before a stage: CLOSE if velocity, control or load change at its start
-    and the body relaxes, else infinite."""
+    """Return the largest tolerance of the last solve before a stage: CLOSE if the body relaxes and the velocity,
+    control or load changes where the stage starts, else infinity."""
     history, start = job.history, job.initial
     if stage == len(history) or not relaxes:
         return math.inf

@@ -1,10 +1,11 @@
-"""The contact laws of a step: start, solve, and errors of failed steps with their place, cause and remedies.
+"""Solve the contact of a step by a contact law, from a start; errors of failed solves state place, cause and remedies.
 
 Start of a solve: pressures change with time and move with the surface. If the surface has moved by whole cells since
-one of the last steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is
-already the solution. With steps of a whole cell this is the last pressure, extrapolated with the one before it; with
-steps of half a cell, the one before the last; with thirds and quarters, an earlier one that is stored in slides with
-chosen steps. Otherwise the last two pressures are extrapolated in the body's frame.
+one of the last steps, the pressure of that step is moved by as many cells, without rounding. In steady sliding the
+moved pressure is already the solution. With steps of a whole cell the last pressure is moved, extrapolated with the
+pressure before it; with steps of half a cell, the pressure before the last. With steps of a third or a quarter, an
+earlier pressure is moved, which only slides with chosen steps store. Otherwise the last two pressures are extrapolated
+in the body's frame.
 
 `DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.problem`), solved from the
 last pressures. `ClosingLaw` is the law of a surface whose finer roughness is squeezed in the interface: under pressure
@@ -13,7 +14,8 @@ the mean planes of this roughness approach by the closing c. With the modulus al
 
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
 
-The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An effect
+The gap `u - h - d` is measured to the undeformed highest points of the finer roughness. In contact these points are
+squeezed, and the gap is `-c`. An effect
 provides this law (`effects.effect.Effect.law`), which is solved by splitting (`contact.splitting`). Energies of the run
 do not include the work on the finer roughness.
 """
@@ -68,7 +70,7 @@ class DetachedError(Exception):
 
 
 def accepts(scene: Scene, contact: Contact) -> bool:
-    """Return True if the job accepts a contact whose solve did not reach the tolerance."""
+    """Return True if `numerics.accept_unconverged` is set and the certificate of an unconverged contact is finite."""
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
@@ -88,8 +90,8 @@ def of_solve(
 ) -> StepError:
     """Return the error for a step whose contact solve has `failed`; collective.
 
-    `tried` names the further attempts, of which `last` is the result of the last one; h are the heights of the surface,
-    which moves by `moved` cells in the step.
+    `tried` names the further attempts, and `last` is the contact of the last attempt. h are the heights of the surface
+    in the run's units; the surface moves by `moved` cells in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
@@ -133,8 +135,8 @@ def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> No
 
 
 def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
-    """Put the start of a step's solve, a map of p for the modulus `alpha`, into `out`. `pasts` are the last pressures,
-    newest first."""
+    """Write the pressure from which the solve of a step starts into `out`, divided by the modulus `alpha` of the step.
+    `pasts` are the last pressures, newest first."""
     if len(pasts) == 1:
         out[...] = pasts[0].pressure
         return
@@ -247,17 +249,17 @@ class DryLaw:
         return None
 
     def with_end(self, memory: None, end: Detached) -> None:
-        """Return None, the memory."""
+        """Return None: this law has no memory."""
 
     def at_rest(self) -> None:
-        """Return None, the memory."""
+        """Return None: this law has no memory."""
 
     def entries(self, memory: None, units: Units) -> dict[str, Entry]:
         """Return no entries."""
         return {}
 
     def restored(self, memory: None, saved: Saved) -> None:
-        """Return None."""
+        """Return None: this law has no memory."""
 
 
 SOFTER = 4.0  # tuning: most modulus of the last step over that of this one, for a start from its pressures
@@ -267,7 +269,7 @@ MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contac
 class ClosingLaw(DryLaw):
     """Contact law with a closing c [m] that depends on the pressure [Pa] at the end of a step, without memory.
 
-    Raises InputError for a body that moves in the mean, and for a hardness.
+    Raises InputError unless the body is a periodic half space without a hardness.
     """
 
     def __init__(self, scene: Scene, law: Callable[[Step], Constraint]) -> None:

@@ -35,12 +35,12 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 
 @dataclass(frozen=True)
 class StepErrors:
-    """Errors of a step.
+    """Relative errors of a step.
 
-    `budget`: errors of friction and area by their sources; None without contact. `step`: the part of the step length
-    alone, which decides about chosen steps. `friction`: friction of the body, infinite after a jump, whose change in
-    the next step is a source of error. `lasting`: the budget without the error of a rise of friction; it sets the
-    tolerance of the next solves.
+    `budget` has the errors of friction and area by their sources; None without contact. `step` is the error that the
+    length of the step alone causes; it determines chosen steps. `friction` is the friction coefficient of the body,
+    from which the next step computes its change; infinite, for unknown, after a jump. `lasting` is the budget without
+    the error of a rise of friction; it sets the tolerance of the next solves.
     """
 
     budget: ErrorBudget | None
@@ -86,9 +86,9 @@ class SolvedStep:
 
 @dataclass(frozen=True)
 class ErrorMemory:
-    """Memory of errors. `friction` is the friction of the body in the last step, infinite after a jump; `sums` are the
-    sums of the error budget; `energy` [J] is the summed error of dissipated energy and of slip loss, infinite if
-    unknown."""
+    """Memory of errors. `friction` is the friction coefficient of the body in the last step; after a jump it is
+    unknown, stored as infinity. `sums` are the sums of the error budgets of all steps. `energy` [J] is the summed error
+    of dissipated energy and of slip loss, infinite if unknown."""
 
     friction: float = math.inf
     sums: ErrorSums = field(default_factory=ErrorSums)
@@ -117,10 +117,10 @@ class BudgetPart:
 
 
 def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared | None, dissipated: float) -> float:
-    """Return the summed error of energies [J] after a further step, infinite without `errors`.
+    """Return the summed error of energies [J] after a further step; infinity if `errors` is None.
 
-    The body has `dissipated` an energy [J] in the step. This energy has the relative errors of the step length and of
-    the area; energy lost in slip has the error of friction.
+    The body has `dissipated` an energy [J] in the step. The relative error of this energy is the error by the step
+    length plus ENERGY times the error of the area. Energy lost in slip has the relative error of friction.
     """
     if errors is None:
         return math.inf
@@ -231,8 +231,8 @@ FURTHER = 2  # tuning: number of pressures kept for starts, from three and four 
 class State:
     """A run after a step: the memories of its parts, by name (`parts_of`). `make_step` returns a new state.
 
-    Maps are in the run's units. A state shares most maps with its successor, and the successor's next step overwrites
-    the oldest maps of this state, which is then invalid.
+    Maps are in the run's units. A state shares most maps with its successor. The step after the successor overwrites
+    the oldest maps of this state; from then on this state is invalid.
     """
 
     memories: Memories
@@ -270,7 +270,7 @@ class State:
 
     @property
     def friction(self) -> float:
-        """Friction of the body in the last step; infinite after a jump."""
+        """Friction coefficient of the body in the last step; infinite, for unknown, after a jump."""
         memory: ErrorMemory = self.memories["errors"]
         return memory.friction
 
@@ -436,7 +436,8 @@ def energies_of(
     scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
     """Return work, stored and dissipated energy [J], and the energy dissipated in each branch; NaN without energies.
-    The work is done on the body, unless an effect computes the work of the load."""
+    The work is done on the body, unless an effect computes the work of the load. `of_effects` has the memories of the
+    effects by name."""
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit, dissipated = scene.energy.unit, memory.dissipated
@@ -452,8 +453,10 @@ def energies_of(
 
 
 def error_of_energies(scene: Scene, summed: float, of_stored: float, of_effects: Memories) -> float:
-    """Return the error of the energies [J] since the start, NaN without energies or if unknown: the error that an
-    effect computes, else `summed` plus ENERGY times `of_stored`, the stored energy times the error of the area."""
+    """Return the error of the energies [J] since the start; NaN without energies or if unknown.
+
+    An effect may compute this error. Otherwise the error is `summed` plus ENERGY times `of_stored` [J]; `of_stored` is
+    the stored energy times the relative error of the area."""
     if scene.energy is None:
         return math.nan
     found = (effect.error_energy(of_effects[name]) for name, effect in scene.effects.items())

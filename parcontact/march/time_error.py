@@ -16,26 +16,29 @@ is delayed by L/2 of a step,
     L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
 
 In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w is a mean over the
-branches with w = G omega tau/(1 + (omega tau)^2), their shares of friction. theta is the angle of a wave with the
-height and the change of the surface; as shorter waves contribute more to friction, the error of many waves is
-MANY_WAVES times as large. Where contact spots of radius a pass by x = (distance of the step)/a, delayed forces move
-their edges:
+branches with w = G omega tau/(1 + (omega tau)^2), their shares of friction. theta is measured as the rms change of the
+displacement divided by the standard deviation of its heights, the angle by which a single wave turns. Shorter waves
+turn further and contribute more to friction: the error of many waves is MANY_WAVES times as large. Where contact spots
+of radius a pass by x = (distance of the step)/a, delayed forces move their edges:
 
     E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
-A quadratic step also follows the bend of the motion. In full contact the error of its loss is 0.25 to 0.33 of theta^2
-<L> plus theta^4/75 (`prony.discrete_modulus`), and again MANY_WAVES times as large. Edges leave an error of third
+A quadratic step also follows the bend of the motion. In full contact the relative error of its loss is
+k theta^2 <L> + theta^4/75 with k from 0.25 to 0.33 (`prony.discrete_modulus`), and again MANY_WAVES times as large for
+many waves. Edges leave an error of third
 order, PASSING x^3.
 
 The second estimate is the embedded pair (`controller`), which shows jumps, changes of load, and creep. For a quadratic
-step it is the difference to a linear step. The pair of a linear step differs in second order if all branches are slow,
-and in first order if some are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of
-the pair counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the
+step it is the difference to a linear step. The pair of a linear step has a difference of second order in dt if all
+branches are slow, and of first order if some are fast; the accumulated error of linear steps has the order 1.7. While
+the surface slides, the estimate is the formula, but at least PAIR_SHARE times the estimate by the pair, since the
+formula only knows the errors at edges. Backward Euler is of first order: its error varies as the root of the
 difference.
 
-Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
-(`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that the
-next change is unknown. The error of the area is a share of the error of friction, and falls with the open area.
+Friction that changes from step to step lags behind by at most <L> times the change; by CURVED_RISE <L> times the change
+in quadratic steps (`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic
+body, so that the next change is unknown. The error of the area is a share of the error of friction, and falls with the
+open area.
 """
 
 import math
@@ -135,7 +138,7 @@ class RunProperties:
 
     @cached_property
     def excess(self) -> float:
-        """Number of cells by which the counted contact area is too large, per cell side on the edge of contact."""
+        """Excess of the counted contact area, in cells, divided by the number of cell sides on the edge of contact."""
         return excess_of(*self.cell, self.edges_follow_grid)
 
 
@@ -143,16 +146,24 @@ class RunProperties:
 class StepObservation:
     """Numbers of a step, or of a steady state, from which errors are estimated.
 
-    `complementarity` of the certificate; `penetrating`: number of points that penetrate without pressure, over the
-    number in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
-    `area`, counted, and `corrected`, as shares; `spared`: correction not made at points on the edge that have yielded;
-    `straight`: the edges follow one axis of the grid, 1, or both, 0; `friction_mismatch`: difference of friction by the
-    slopes of the rigid surface and of the body; `way`: direction of sliding, (0, 0) at rest.
+    * `complementarity`: a number of the solve's certificate;
+    * `friction`, `interface`: the friction coefficient, and the part of it that the interface causes;
+    * `area`, `corrected`: the counted and the corrected contact area, as shares of the box;
+    * `slope`: rms slope of the surface, weighted by the pressure;
+    * `penetrating`: number of points that penetrate without pressure, divided by the number in contact;
+    * `spared`: share of the box by which the area is not corrected, since points on the edge have yielded;
+    * `straight`: 1 if all edges of contact follow one axis of the grid, 0 if they follow both equally;
+    * `friction_mismatch`: friction by the slopes of the rigid surface minus friction by the slopes of the body;
+    * `way`: direction of sliding, (0, 0) at rest.
 
-    For steps also: `difference` of the embedded pair, and its `order`; `slid`: cells (of mean sides) slid in `seconds`;
-    `angle` of the pair; `curved`: the displacement is quadratic in time; `change` of friction since the step before,
-    infinite after a jump; `own_error`: error of the step length that a body without branches states; `uneven`: (largest
-    - mean)/mean pressure, at most 1.
+    Steps also have:
+
+    * `difference`, `order`, `angle`: results of the embedded pair (`controller.IntegratorDifference`);
+    * `slid`, `seconds`: the distance slid in the step, in cells of mean sides, and the length of the step [s];
+    * `curved`: True if the displacement is quadratic in time;
+    * `change`: friction of the body minus its friction in the step before, infinite after a jump;
+    * `own_error`: relative error by the step length that a body without branches computes itself, or None;
+    * `uneven`: (largest - mean)/mean pressure, at most 1.
     """
 
     complementarity: float
@@ -219,8 +230,10 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
-    """Return the mean radius of spots of contact, in cells of mean sides. Gaps between spots count instead if their
-    area is smaller. If edges follow the grid, return half the width of strips; return infinity without edges."""
+    """Return the mean radius of the spots of contact, or of the gaps between them if the gaps have the smaller area.
+
+    The unit is the mean side of a cell. If edges follow the grid, the spots or gaps are strips, and the result is half
+    their mean width. Without edges it is infinity."""
     sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
     if sides <= 0.0:
         return math.inf
@@ -243,7 +256,7 @@ def count_spots(run: RunProperties, observed: StepObservation) -> float:
 
 def resolves(run: RunProperties, observed: StepObservation) -> bool:
     """Return False if the true spots of contact may be smaller than a cell, so that the error of their area is unknown.
-    Errors of many spots average out, except for spots of single cells."""
+    Many spots may be smaller than a single spot, since their errors average out, but not as small as single cells."""
     if not 0.0 < observed.area < 0.5:
         return True
     return radius_of(run, observed) >= (ONE_RADIUS if count_spots(run, observed) < 2.0 else MANY_RADIUS)
@@ -302,7 +315,8 @@ def _error_by_pair(observed: StepObservation) -> float:
 
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
     """Return the relative error that a change of friction since the step before causes, as after rest: friction is
-    delayed by <L> of a step. After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
+    delayed by <L> of a step. After a jump the change is unknown; it is then estimated by the rms slope of the
+    surface times the sine of the body's loss angle times `uneven`."""
     if run.prony is None or not run.exponential or not observed.slid or observed.body <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed), observed.angle)
