@@ -101,7 +101,8 @@ class CurveTable:
         files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
-        """Return the indices of points that are not in the table, and of points `bare` of requested maps."""
+        """Return the indices of points that are not in the table, and of the points `bare` in the table whose
+        requested maps are missing."""
         found = tables.lacking_points(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -131,7 +132,8 @@ class CurveTable:
             self._console.warn(str(doubt), shown(doubt))
 
     def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
-        """Add the lines of a point, unless the table has the point already, which was then solved for its maps only."""
+        """Add the lines of a point, unless the table has the point already: such a point was solved for its maps
+        only."""
         m, speed = point.measures, point.speed
         if not tables.lacking_points([Wanted(speed, m.pressure, point.temperature)], self.known):
             return
@@ -153,7 +155,8 @@ class CurveTable:
         tables.write(self.path.parent, self._lost)
 
     def conclude(self, failures: int, draw: Draw | None) -> None:
-        """Sort a curve solved in any order, `draw` it, and report the number of failures; raises OSError."""
+        """Sort the points of a curve that were solved in any order, draw the curve by `draw`, and report the number of
+        failures; raises OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -200,7 +203,7 @@ WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {whe
 
 
 def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
-    """Yield warnings about the solved points of a curve, of effects and of `describe_missed`."""
+    """Yield warnings about the solved points of a curve: the warnings of effects, and those of `describe_missed`."""
     for asked in answers("steady", "doubts_of_points"):
         yield from asked(points, job)
     yield from describe_missed(points, job, earlier)
@@ -209,7 +212,7 @@ def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoi
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
     """Yield warnings about points whose error of friction or of the corrected area exceeds the accuracy of the job.
 
-    Points of `earlier` runs count, too, although the parts of their errors are not known.
+    Points of `earlier` runs count, too, although the shares of the sources in their errors are not known.
     """
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     known = [point for point in points if point.errors.resolved]
@@ -325,7 +328,7 @@ def on_one_grid(job: Job, slab: Slab) -> States:
 
 
 def watch_contacts(setup: Setup) -> sanity.ContactWatch:
-    """Return the checks of the contacts of a curve, each of which gives each kind of warning once."""
+    """Return the checks of the contacts of a curve. They give each kind of warning once for the curve."""
     chosen = setup.choices
     return sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
@@ -350,7 +353,8 @@ def run_curve(
     make: Callable[[Job, Slab], States] = on_one_grid,
     draw: Draw | None = None,
 ) -> int:
-    """Solve all missing points of a friction curve, and write each at once; collective. Return the exit code.
+    """Solve all missing points of a friction curve, and write each point as soon as it is solved; collective. Return
+    the exit code.
 
     If a point fails, the others are still solved, and the exit code is 1. `restart` of the options is `auto` or
     `never`. `make` makes the solver of the states; `draw` draws the finished curve, on root.

@@ -15,9 +15,8 @@ the mean planes of this roughness approach by the closing c. With the modulus al
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
 
 The gap `u - h - d` is measured to the undeformed highest points of the finer roughness. In contact these points are
-squeezed, and the gap is `-c`. An effect
-provides this law (`effects.effect.Effect.law`), which is solved by splitting (`contact.splitting`). Energies of the run
-do not include the work on the finer roughness.
+squeezed, and the gap is `-c`. An effect provides this law (`effects.effect.Effect.law`), which is solved by splitting
+(`contact.splitting`). Energies of the run do not include the work on the finer roughness.
 """
 
 import math

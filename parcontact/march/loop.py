@@ -269,7 +269,7 @@ class March:
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
         """Yield the steps after the last one made, each decided on demand; collective. A step that replaces several
-        steps ends at the latest with the first one that reaches `until` [s]."""
+        steps of the timeline ends no later than the first step of the timeline that reaches `until` [s]."""
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
         while self.row.step < len(timeline) and not self.detached:
@@ -345,8 +345,8 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
     """Return the step after the last one made.
 
     At rest under a constant load a body without memory does not change: one step then replaces all further steps of a
-    stage whose time steps grow. This step ends where fields are due next, or with the step number `stop`. The decision
-    follows from the state, so that it is the same after a restart.
+    stage whose time steps grow. This step ends where fields are written next, at the end of the step `stop`, or with
+    the stage. The decision follows from the state, so that it is the same after a restart.
     """
     number = state.row.step + 1
     span = timeline.span(number)

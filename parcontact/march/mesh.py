@@ -11,10 +11,10 @@ The guess is Persson's theory for frictionless contact of an elastic body (B. N.
 
     A = erf(sqrt(2) p/(E h')),      E = 2 |G|/(1 - nu),
 
-here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the larger
-area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times this frequency. If the loss angle is still
-proportional to the frequency at FINEST times this frequency, sliding is slow, and edges lose power in waves shorter
-than the cells (`march.budget`).
+here with the modulus G at FEW times the frequency f with which the shortest wave passes. Sliding surfaces have the
+larger area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times f. If the loss angle is still
+proportional to the frequency at FINEST times f, sliding is slow, and edges lose power in waves shorter than the cells
+(`march.budget`). Names in capitals are constants of this module.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Loaded(Protocol):
 
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     """Return a guess of the contact for each load and speed of a job, whose shortest wave is `wave` [m] and whose box
-    has the `area` [m^2]. Contacts in slow sliding are guessed only for friction curves."""
+    has the `area` [m^2]. Only for friction curves a guess says how slow the sliding is."""
     from ..effects.branches import relaxation_of
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
@@ -164,8 +164,8 @@ def _of_any_stage(stage: Any) -> Any:
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Replace words such as `auto` for the grid in the source of a job by numbers. Return the origin of the job with a
-    sentence on this choice."""
+    """Replace words such as `auto` for the grid in the source of a job by numbers. Return the origin of the job
+    (`job.parts.Origin`) with a sentence on the chosen numbers."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
 
@@ -294,8 +294,12 @@ def _take_grid(source: Source, origin: Origin) -> None:
 
 
 def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Return the numbers of points along x and y and the size [m] of the whole map, or of the given box. A mirrored map
-    is twice as long. Raises InputError, also for line scans."""
+    """Return the numbers of points along x and y in a box with the spacing of the map, and the size [m] of the whole
+    map.
+
+    The box has the sides `box` [m], or the size of the map where these are not numbers. A mirrored map is twice as
+    long. Raises InputError, also for line scans.
+    """
     shapes = surface if isinstance(surface, list) else [surface]
     heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
     arrays = [given for given in heights if is_array(given)]

@@ -73,9 +73,9 @@ def _indenter(part: jobs.Indenter, grid: Grid) -> Shape:
 def shortest_measured(job: Job, surface: Surface) -> float | None:
     """Return the shortest wave [m] of a measured surface, from its spectrum on the grid; collective.
 
-    Return None for a surface whose waves the job gives, or without slopes. A map that is not periodic is multiplied by
-    a window, as a jump or a crease at its edges has waves of any length. The window raises the highest number of waves
-    in the box by up to 1, of which half is subtracted.
+    Return None if the job itself gives the waves of the surface, or if the surface has no slopes. A map that is not
+    periodic is multiplied by a window, as a jump or a crease at its edges has waves of any length. The window raises
+    the highest number of waves in the box by up to 1. Half of this excess is subtracted.
     """
     if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
         return None

@@ -126,14 +126,14 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
 
 
 def has_full_contact(setup: Setup) -> bool:
-    """Return True if the approach has an upper limit: on a periodic body whose mean level is fixed, unless the rigid
-    surface yields."""
+    """Return True if the approach has an upper limit: the body is periodic, its mean level is fixed, and no hardness
+    bounds the pressure."""
     return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
 
 
 def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
-    """Return a sentence if an approach [m] is beyond full contact, else ''; the datum is `mean` [m] below the mean
-    height."""
+    """Return a sentence if an approach [m] is beyond full contact, else ''; heights have the mean
+    `mean` [m] above the datum of the surface."""
     closed = -mean - setup.surface.datum
     rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
     if approach - closed <= rounding:
@@ -157,7 +157,7 @@ def below_rounding(setup: Setup, approach: float) -> str:
 
 
 def refuse_approaches(setup: Setup) -> None:
-    """Raise JobError for stages whose approach exceeds the approach at full contact, or is lost in the rounding of the
+    """Raise JobError for stages whose approach is beyond full contact, or is lost in the rounding of the
     heights."""
     mistakes, bounded = [], has_full_contact(setup)
     for index, stage in enumerate(setup.job.history):
@@ -257,8 +257,8 @@ class ContactWatch:
         return self.check_point(measures, f"step {step}", ends_a_stage)
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
-        """Return warnings about a contact, and about its cells if it is `final`; raises RunError if these are
-        errors."""
+        """Return warnings about a contact. Only a `final` contact, at the end of a stage or of a solve, is checked for
+        too few cells. Raises RunError if the job turns warnings into errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]

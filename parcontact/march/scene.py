@@ -200,8 +200,8 @@ class Scene:
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Box:
-        """Return the bounds of p in a step of modulus alpha, in which the pressure is `alpha p`. An upper bound of at
-        least `most` is omitted."""
+        """Return the bounds of p in a step of modulus alpha, in which the pressure is `alpha p`. An upper bound
+        on p that is not below `most` is left out, as no p can reach such a bound."""
         return effect.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
@@ -265,7 +265,8 @@ def solver_on(
 
 
 def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
-    """Return a function that makes a solver and operators on tiles, on one rank; None if the body has none."""
+    """Return a function that makes a solver and operators on the tiles that cover the contact,
+    on one rank; None if the body cannot be solved on tiles of this grid."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 

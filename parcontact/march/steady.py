@@ -2,8 +2,8 @@
 
 A march that starts from steady sliding gets contact, displacement and branches of a surface that has always slid.
 
-A wave of amplitude u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with w the frequency with which it passes
-a point, and A its displacement divided by its pressure for a modulus of 1.
+A wave of amplitude u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, per unit of area. w [rad/s] is the
+frequency with which the wave passes a point, and A is the ratio of its displacement to its pressure for the modulus 1.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ class Point:
 
 
 def in_rounds(points: Sequence[Point]) -> Point:
-    """Return the last of the points that the rounds of a fixed point have given, with the cost of all rounds, and with
-    the relative changes in the last round as errors."""
+    """Return the last of the points that the rounds of a fixed point have given, with the cost of all rounds. The
+    relative changes of friction and area in the last round are added to its errors."""
     *_, before, last = [*points[-1:], *points]
     friction, area = (
         abs(one - other) / one if one > 0.0 else 0.0
@@ -176,9 +176,9 @@ class SteadyLevel:
 class SteadySliding:
     """Solver of the steady states of one job's surface and body; the constructor and the methods are collective.
 
-    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on
-    certificates follows from the tolerance of the job and is at most `most`. Raises InputError for a body with a memory
-    that has no branches.
+    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on the
+    certificates of solves follows from the tolerance of the job and is at most `most`. Raises InputError for a body
+    with a memory that has no branches.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -218,8 +218,8 @@ class SteadySliding:
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
-        Effects whose modules `steady` define `loops` repeat the solve within these loops. Raises RunError, with the
-        certificate reached, if no start leads to a solution, or if a loop does not settle.
+        Effects may repeat the solve until their own unknowns settle, by `loops` in their modules `steady`. Raises
+        RunError, with the certificate reached, if no start leads to a solution, or if a loop does not settle.
         """
         solve = self._solve
         for loop in self.loops:
@@ -260,8 +260,8 @@ class SteadySliding:
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def field(self, name: str) -> Array:
-        """Return, for the last state, this rank's rows of `pressure` [Pa], of `displacement`, `gap` or `height` [m], or
-        of a map of an effect."""
+        """Return this rank's rows of a map of the last state: `pressure` [Pa], `displacement`, `gap` or `height` [m],
+        or a map of an effect in its own unit."""
         assert self.contact is not None
         for loop in self.loops:
             if name in loop.fields:
@@ -362,8 +362,9 @@ class SteadySliding:
 def judge_state(
     setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return friction, and the relative errors of friction and area. Friction is the sum of `by_energy`, from the
-    dissipated power, and the friction of an interface."""
+    """Return the friction coefficient, and the relative errors of friction and area. Friction is the sum of
+    `by_energy`, which follows from the dissipated power, and the friction of an interface. `known` are the properties
+    of the run."""
     friction = by_energy + measures.friction_interface
     seen = StepObservation(
         certificate.complementarity,
@@ -379,9 +380,9 @@ def judge_state(
 
 
 def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
-    """Return the grid lines along a velocity [m/s], with the ratio of |G| for the longest wave along them to G_inf, the
-    modulus of waves that do not vary along them; None for an elastic body, a line of points, a free box, and an oblique
-    velocity."""
+    """Return the grid lines along a velocity [m/s] and the ratio |G|/G_inf. The longest wave along the lines has the
+    modulus G; waves that do not vary along the lines have the modulus G_inf. Return None for an elastic body, a line of
+    points, a free box, and an oblique velocity."""
     grid = setup.grid
     if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
         return None
@@ -422,7 +423,7 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
 
 def start_march(scene: Scene, contact: Contact | None = None, **of_row: Any) -> March:
     """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of the job's section
-    `initial`; collective. `of_row` are values for the record at time 0."""
+    `initial`; collective. `of_row` are values of `StepRow` for the record at time 0."""
     if contact is None:
         return March(scene)
     body, workspace = scene.material.at_rest(), scene.solver.workspace

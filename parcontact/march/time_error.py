@@ -31,8 +31,8 @@ order, PASSING x^3.
 The second estimate is the embedded pair (`controller`), which shows jumps, changes of load, and creep. For a quadratic
 step it is the difference to a linear step. The pair of a linear step has a difference of second order in dt if all
 branches are slow, and of first order if some are fast; the accumulated error of linear steps has the order 1.7. While
-the surface slides, the estimate is the formula, but at least PAIR_SHARE times the estimate by the pair, since the
-formula only knows the errors at edges. Backward Euler is of first order: its error varies as the root of the
+the surface slides, the estimate is the formula, but at least PAIR_SHARE times the estimate by the pair, which
+also shows errors that edges do not cause. Backward Euler is of first order: its error varies as the root of the
 difference.
 
 Friction that changes from step to step lags behind by at most <L> times the change; by CURVED_RISE <L> times the change
