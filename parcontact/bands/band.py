@@ -271,7 +271,8 @@ def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spec
     for dx, dy in product(parts, parts[:1] * 0.0 if line else parts):
         q = np.hypot(qx + dx, qy + dy)
         slopes += cut.spectrum.density_of_slopes(q, low, high)
-    area = step / (2.0 * np.pi * PARTS) if line else (step / (2.0 * np.pi * PARTS)) ** 2
+    share = step / (2.0 * np.pi * PARTS)
+    area = share / 2.0 if line else share**2  # a line has each wavenumber twice, k and -k
     q = np.hypot(qx, qy)
     heights = np.divide(slopes * area, q**2, out=np.zeros_like(q), where=q > 0.0)
     sizes = np.abs(waves)

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band import Band, PressureLadder, Rung
-from parcontact.bands.choice import spectrum_of
+from parcontact.bands.choice import cut_bands, spectrum_of
 from parcontact.bands.road_sliding import LEAST_METHOD, LEAST_OF_AREA, RoadSliding
 from parcontact.effects.branches import relaxation_of
 from parcontact.errors import JobError, RunError
@@ -54,6 +54,18 @@ def test_one_band_is_steady_on_one_grid(pressure: float) -> None:
     assert bands.measures.mean_gap == pytest.approx(grid.measures.mean_gap, rel=1e-3)
     assert bands.dissipated == pytest.approx(grid.dissipated, rel=2e-3, abs=0.0)
     assert (bands.errors.friction or bands.errors.area).method == 0.0
+
+
+@pytest.mark.parametrize("points", [[1024, 1], [128, 128]], ids=["profile", "map"])
+def test_the_surface_of_a_band_has_the_slope_of_the_spectrum(points: list[int]) -> None:
+    """By the transform of its heights; 1e-3: a wave has the spectrum of its cell, which is summed at a few points."""
+    job = jobs.load({**JOB, "bands": {"samples": 1, "count": 1, "points": points}})
+    band = Band(job, cut_bands(job), 0, 0)
+    grid = band.setup.grid
+    waves = np.fft.fft2(band.heights * band.setup.units.height) / band.heights.size
+    qx, qy = (2.0 * np.pi * np.fft.fftfreq(n, d) for n, d in ((grid.nx, grid.dx), (grid.ny, grid.dy)))
+    slope = np.sqrt(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2)))
+    assert slope == pytest.approx(ROUGH["rms_slope"], rel=1e-3)
 
 
 def full_contact(job: jobs.Job, speed: float, pressure: float) -> float:

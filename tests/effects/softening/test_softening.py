@@ -245,13 +245,12 @@ POWER_LAW = {  # G' ~ omega^0.15, G''/G' = tan(0.15 pi/2)
 )
 def test_bands_in_full_contact(hurst: float, slope: float, ratio: float) -> None:
     """Three decades of waves, slope spectrum q^(2 - 2H), one strain a band: softened over unsoftened friction within
-    3 % of finite elements along the depth. On profiles, whose spectrum has an exponent less by one; bands give a
-    profile the slopes of both directions."""
+    3 % of finite elements along the depth. On profiles, whose spectrum has an exponent less by one."""
     frictions = []
     for table in (None, TABLE):
         data: Json = {
             "surface": {
-                **{"shape": "rough", "hurst": max(hurst - 0.5, 1e-3), "rms_slope": slope / math.sqrt(2.0), "seed": 1},
+                **{"shape": "rough", "hurst": max(hurst - 0.5, 1e-3), "rms_slope": slope, "seed": 1},
                 **{"long_wavelength": 1e-3, "short_wavelength": 1e-6},
             },
             "material": POWER_LAW,
