@@ -286,7 +286,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     if job.bands is not None:
         spectrum = cut_bands(job).spectrum.without_shorter(shortest)
         phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
-        return persson.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
+        return persson.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks, line=spectrum.line)
     part = _only_rough(job)
     if part is None:
         raise InputError(ONE_ROUGH)
@@ -295,8 +295,8 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
-    limits = (k_long, k_short, slide, (k_rolloff,))
-    unit = persson.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
+    limits, line = (k_long, k_short, slide, (k_rolloff,)), 1 in job.grid.points
+    unit = persson.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits, line=line)
     amplitude, kx, ky = unit.waves
     power = np.abs(amplitude) ** 2 / 2
     if part.rms_slope is not None:
@@ -304,7 +304,10 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     elif part.rms_height is not None:
         factor = part.rms_height / math.sqrt(np.sum(power))
     else:
-        factor = math.sqrt(part.psd_constant or 0.0)
+        norm = 2 / job.grid.size[job.grid.points.index(1)] if line else 1.0  # m^4 to m^3; k stands for k and -k
+        factor = math.sqrt((part.psd_constant or 0.0) * norm)
+    if job.grid.points[0] == 1:  # a profile along y
+        unit = replace(unit, waves=wavy.Waves(amplitude, ky, kx))
     return unit.scaled(factor)
 
 

@@ -117,8 +117,10 @@ def rings_of_spectrum(
     distance: float = 0.0,
     kinks: Sequence[float] = (),
     refinement: int = 1,
+    line: bool = False,
 ) -> Rings:
-    """Return waves that represent an isotropic spectrum Phi(k) [m^4] between two wavenumbers [rad/m].
+    """Return waves that represent an isotropic spectrum Phi(k) [m^4] between two wavenumbers [rad/m], or the spectrum
+    [m^3] of a profile along x if `line` is True (`bands.choice.WaveSpectrum.moment` has the norm of both).
 
     `distance` [m] is the largest distance between two positions of the surface while the body remembers both. Panels
     and angles are so fine that neighbouring waves stay in phase over this distance, but at most over the distance at
@@ -133,6 +135,9 @@ def rings_of_spectrum(
     x = (edges[:-1, None] + half * (1 + nodes)).ravel()
     k = smallest * np.exp(logarithm * x**2)
     areas = 2 * x * logarithm * k**2 * (half * weights).ravel()  # k dk
+    if line:
+        amplitude = np.sqrt(spectrum(k) * areas / k / np.pi)
+        return Rings(Waves(amplitude.astype(complex), k, 0.0 * k), np.arange(k.size), _partial_shares(nodes, weights))
     angles = refinement * QUADRANT_ANGLES + ANGLES_STEP * np.ceil(k * distance / 2 / ANGLES_STEP).astype(int)
     unit = map(_two_quadrants, angles)  # Gauss points of two quadrants
     parts = [(q * x, q * y, area * share) for q, area, (x, y, share) in zip(k, areas, unit, strict=True)]

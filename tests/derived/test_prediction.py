@@ -66,16 +66,20 @@ def test_full_contact_is_that_of_the_run() -> None:
     assert min(row.contact_area for row in found[1:]) > 1.0 - 1e-9
 
 
+@pytest.mark.parametrize(
+    "grid", [{"points": 64, "size": 1e-3}, {"points": [512, 1], "size": [8e-3, 1e-3]}], ids=["map", "profile"]
+)
 @pytest.mark.parametrize("amount", [{"rms_slope": 0.01}, {"rms_height": 3e-7}, {"psd_constant": 1e-21}])
-def test_continuum_and_lattice(amount: dict[str, float]) -> None:
+def test_continuum_and_lattice(amount: dict[str, float], grid: dict[str, Any]) -> None:
     """In full contact friction depends on the spectrum only: a box with many waves of fixed amplitudes is near it.
 
-    5 %: the box has 8 to 16 waves along each side, whose number in a ring differs from its area by some per cent.
+    5 %: the map has 8 to 16 waves along each side, whose number in a ring differs from its area by some per cent. The
+    profile has 64 waves.
     """
     rough: dict[str, Any] = {"shape": "rough", "hurst": 0.9, "amplitudes": "fixed", **amount}
     rough |= {"long_wavelength": 1.25e-4, "short_wavelength": 6.25e-5}
     stage = {"pressure": 1e8, "velocity": 0.04, "distance": 1e-3, "cells_per_step": 32}
-    one = job(surface=[rough, {"shape": "flat"}], grid={"points": 64, "size": 1e-3}, history=[stage])
+    one = job(surface=[rough, {"shape": "flat"}], grid=grid, history=[stage])
     lattice, continuum = (predicted(one, waves)[-1] for waves in ("lattice", "continuum"))
     assert lattice.contact_area == continuum.contact_area == 1.0
     assert_allclose(lattice.friction, continuum.friction, rtol=0.05)
