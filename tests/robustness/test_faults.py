@@ -320,10 +320,11 @@ def test_mpirun_that_is_asked_to_end(here: Path, outside_mpi: dict[str, str]) ->
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
 def test_signals_that_mpirun_hands_on(here: Path, number: signal.Signals) -> None:
-    """A launcher is asked by SIGUSR1, whatever signal it was."""
+    """A launcher is asked by SIGUSR1, whatever signal it was. The tests may run under nohup, which ignores SIGHUP."""
     launcher = "trap 'exit 3' USR1; touch ready; while :; do sleep 0.05; done"
     words = [sys.executable, "-I", "-S", str(ROOT / "scripts/launch.py"), "sh", "-c", launcher]
-    process = subprocess.Popen(words, start_new_session=True, text=True)
+    heard = lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL)  # noqa: E731
+    process = subprocess.Popen(words, start_new_session=True, text=True, preexec_fn=heard)
     wait_for(process, (here / "ready").exists)
     process.send_signal(number)
     assert process.wait(timeout=SECONDS) == AGAIN
