@@ -104,9 +104,9 @@ class SolvedContact(Generic[Remembered]):
 class EdgeMotion(NamedTuple):
     """Motion of a contact in a step.
 
-    `front` is the distance by which the edges of contact moved, divided by half the length of the process zone of
-    adhesion. `untouched` is True if nothing touches or is under tension, neither before nor after the step. `begins` is
-    True if surfaces that attract each other touch either before or after the step, but not both.
+    `front` is the distance by which the edges of contact moved, divided by half the length of the zone in which
+    surfaces separate. `untouched` is True if nothing touches or is under tension, neither before nor after the step.
+    `begins` is True if surfaces that attract each other touch either before or after the step, but not both.
     """
 
     front: float = 0.0

@@ -58,7 +58,7 @@ class Sections(Protocol):
 
     @property
     def sheared_first(self) -> bool:
-        """Return True if an effect, such as sticking, shears the contact before the surface slides over it."""
+        """Return True if an effect shears the contact before the surface slides over it."""
 
     @property
     def remembers(self) -> bool:

@@ -312,8 +312,8 @@ class Step(NamedTuple):
     A step with dt = 0 is a jump of the load. `control` names the kind of the `load` (Pa, N or m). `growth` is dt over
     the dt of the step before, and 0 after a jump: results are extrapolated by this factor. `passed` is the number of
     further steps that this step replaces. `decide` exists for a step that may be too long. Its arguments are the error
-    of the step and, with adhesion, the motion of the edge of the contact over half the width of the zone in which
-    surfaces separate. It returns a shorter step to make instead, or the record of this step.
+    of the step and, if surfaces attract each other, the motion of the edge of the contact over half the width of the
+    zone in which surfaces separate. It returns a shorter step to make instead, or the record of this step.
     """
 
     number: int

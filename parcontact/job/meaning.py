@@ -368,7 +368,7 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 
 def neighbours(job: Sections) -> Iterator[Doubt]:
     """Yield a warning if the images of a single sphere in a periodic box change its load, for the contact radii of the
-    history by Hertz's theory without adhesion."""
+    history by Hertz's theory."""
     modulus, grid = instant_contact_modulus(job.material.fitted), job.grid
     yield from acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, grid) for stage in job.history), default=0.0)

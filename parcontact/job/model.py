@@ -186,7 +186,7 @@ class Job(Part):
 
     @property
     def sheared_first(self) -> bool:
-        """Return True if an effect, such as sticking, shears the contact before the surface slides over it."""
+        """Return True if an effect shears the contact before the surface slides over it."""
         return any(asked(self) for asked in self.asked("sheared_first"))
 
     def resolved(self) -> str:

@@ -478,11 +478,11 @@ class HalfSpace:
         operator = free_operator(tiles, self.size, self.poisson, self.response.coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
-    # -- of contacts that stick -------------------------------------------------------------------------------------
+    # -- under tractions along the surface ----------------------------------------------------------------------------
 
     def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
-        """Return two operators and two numbers for the gap solver (`effects.adhesion.gap_solver`); collective where the
-        half space is free.
+        """Return two operators and two numbers for solvers that find the gap; collective where the half space is
+        free.
 
         The first operator takes pressure to displacement. The second operator is the inverse of the first, but takes a
         uniform displacement to 0. The first number is the displacement under a uniform unit pressure, which is 0 for
