@@ -64,8 +64,8 @@ class PressureLadder:
     @classmethod
     def over(cls, mean: float, rms: float) -> PressureLadder:
         """Return the ladder of a band, for the mean pressure and the rms deviation [Pa] that coarser bands give in full
-        contact. The rungs are equally spaced in the logarithm, up to ABOVE deviations over the mean pressure. Without a
-        deviation the mean pressure is the only rung."""
+        contact. The rungs are equally spaced in the logarithm, up to the mean pressure and `ABOVE` deviations.
+        Without a deviation the mean pressure is the only rung."""
         if not rms > 0.0:
             return cls(np.array([mean]))
         top = mean + ABOVE * rms
@@ -105,7 +105,8 @@ class Rung:
     `friction` [-] of the band's waves follows from the dissipated power, and `friction_slopes` from the pressures on
     slopes. Contact areas are shares of the nominal area. `Cascade.climb` adds the approach of finer bands to the
     `approach` [m]. `weights` are those of the ladder of the next finer band, and `load_lost` is the share of the load
-    above this ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects by name (`Probe`).
+    above the top of that ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects by name
+    (`Probe`).
     """
 
     pressure: float

@@ -408,7 +408,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     """Run all cases of a study, one after the other on all ranks; collective. Return the exit code.
 
     `make` returns the job changed by overrides. All jobs are read before the first case runs. After a stop the same
-    command continues. The directory has the results of a sweep, and the results of the study once all cases are
+    command continues. The directory has the files of a sweep, and the results of the study once all cases are
     finished.
     """
     refined = ladders(job)

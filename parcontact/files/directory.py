@@ -93,7 +93,7 @@ class Directory:
         self._on_root(act)
 
     def withdraw(self, job: Path) -> None:
-        """Remove the files that `make` has written for the file of a job, which stays; collective."""
+        """Remove the files that `make` has written for the file of a job. The file of the job stays. Collective."""
 
         def act() -> None:
             del self.claims[self.verb]

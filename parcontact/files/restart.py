@@ -148,8 +148,8 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Return a message on the first completed step of a checkpoint that is another one in the history of this job, or
-    ''; later steps may differ."""
+    """Return a message on the first completed step of a checkpoint that differs from the same step of this job, or ''.
+    Later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
     kind: Any = type(job).model_fields["history"].annotation
     history = TypeAdapter(kind).validate_python(contents.job["history"])

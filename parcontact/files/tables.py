@@ -132,7 +132,7 @@ def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:
 
 
 def lacking_points(points: Sequence[Place], there: Sequence[Place]) -> list[int]:
-    """Return the indices of those `points` that differ from all points `there`."""
+    """Return the indices of the `points` that are not among the points `there`."""
     return [number for number, point in enumerate(points) if not any(is_same(point, other) for other in there)]
 
 

@@ -63,7 +63,7 @@ def most_cells(job: Sections) -> int:
 
 def longest_change(stage: Stage) -> float:
     """Return the longest step [s] in which a ramp of the load, or the phase of an oscillation, changes little enough;
-    the whole stage without either."""
+    the length of the stage if it has neither."""
     if stage.frequency:
         return 1.0 / (CYCLE_STEPS * stage.frequency)
     return stage.seconds if stage.constant else stage.seconds / RAMP_STEPS

@@ -383,11 +383,11 @@ WARN_IMAGES = Kind(
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
-    """Yield a warning if the periodic images of a single sphere change its load by more than a share ALONE.
+    """Yield a warning if the periodic images of a single sphere change its load by more than the share `ALONE` of it.
 
-    `contact` returns the contact radius a [m] from the radius of the sphere [m]; effects give their own. An image at
-    the distance r with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact radius changes
-    by `2 a^3/(3 pi) sum 1/r^3`.
+    `contact` returns the contact radius a [m] from the radius of the sphere [m]; an effect may give another function.
+    An image at the distance r with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact
+    radius changes by `2 a^3/(3 pi) sum 1/r^3`.
     """
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1

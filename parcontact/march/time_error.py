@@ -151,7 +151,7 @@ class StepObservation:
     * `area`, `corrected`: the counted and the corrected contact area, as shares of the box;
     * `slope`: rms slope of the surface, weighted by the pressure;
     * `penetrating`: number of points that penetrate without pressure, divided by the number in contact;
-    * `spared`: share of the box by which the area is not corrected, since points on the edge have yielded;
+    * `spared`: share of the box left out of the correction of the area, since points on the edge have yielded;
     * `straight`: 1 if all edges of contact follow one axis of the grid, 0 if they follow both equally;
     * `friction_mismatch`: friction by the slopes of the rigid surface minus friction by the slopes of the body;
     * `way`: direction of sliding, (0, 0) at rest.
@@ -162,7 +162,7 @@ class StepObservation:
     * `slid`, `seconds`: the distance slid in the step, in cells of mean sides, and the length of the step [s];
     * `curved`: True if the displacement is quadratic in time;
     * `change`: friction of the body minus its friction in the step before, infinite after a jump;
-    * `own_error`: relative error by the step length that a body without branches computes itself, or None;
+    * `own_error`: relative error of the time step, computed by a body that has no branches, or None;
     * `uneven`: (largest - mean)/mean pressure, at most 1.
     """
 

@@ -214,8 +214,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus `alpha`, whose effective heights are those of the module; local to this rank. The new
-        step replaces any step that has begun from the same memory.
+        """Begin a step of modulus `alpha`; local to this rank. The docstring of the module has its effective heights.
+        The new step replaces any step that has begun from the same memory.
 
         `growth` is dt divided by the length of the step before. `growth` is 0 after a jump and in the first step of a
         stage.

@@ -233,8 +233,8 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
 
 
 def steady_title(directory: Path) -> str:
-    """Return the title of a curve's picture: the title of its job. If all points have one load, it follows: the force
-    on a free box, else the mean pressure."""
+    """Return the title of a curve's picture: the title of its job. If all points have the same load, the title
+    ends with this load: the force on a free box, else the mean pressure."""
     curve = Results(directory, "steady")
     axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
     name = (curve.job.title if curve.job else "") or "steady sliding"

@@ -155,7 +155,7 @@ class Results:
     @property
     def telling_row(self) -> int:
         """Row that shows the contact of a run best. It is the last row, unless contact is lost there. Then an effect
-        may name a row, such as the row of the pull-off; else it is the last row of the largest load."""
+        may name a row, for instance the row of the pull-off; otherwise it is the last row of the largest load."""
         pressure, area = (np.asarray(self.table[name], float) for name in ("pressure", "contact_area"))
         if area[-1] > 0.0 and not self.detached:
             return len(area) - 1

@@ -1,4 +1,4 @@
-"""Results of leakage in texts: conductivities, and the loads between which contact closes the gap along x and along y.
+"""Results of leakage in texts: conductivities, and the two loads between which the gap closes, along x and along y.
 
 Conductivities K are read from `leak.csv`, which `parcontact leak` makes from saved gaps, else from measures.csv.
 """

@@ -157,7 +157,7 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
 
     The residual of a point that sticks is its slip w. That of a point that slips is the part of w across its traction,
     times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`: those that
-    stick, and those that slip whose traction is sufficiently across the axis. Elsewhere r is 0.
+    stick, and slipping points with a traction that is sufficiently across the axis. Elsewhere r is 0.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
