@@ -99,28 +99,6 @@ LOAD_ROUNDING = 1e-14  # accuracy: tolerance on the load, as a share of it, set 
 SNAP = 1e-12  # accuracy: pressures within this share of the range of a bound are put on the bound
 
 
-CELL = 16  # tuning: side of the cells that lose what was added in them [points]
-MOST_TAKEN = 0.5  # tuning: largest share of its load that a cell loses
-
-
-def take_back(box: Box, p: Array, added: Array) -> None:
-    """Reduce pressures near the points to which limiting p to its bounds has added load; local to this rank.
-
-    `added` is the map of what the limits have added to p. In each cell of CELL x CELL points, p less its lower bound is
-    multiplied by one factor, so that the cell loses the sum of `added` over its points, but at most the share
-    MOST_TAKEN of its load. A spot in contact then keeps its load, and long waves of the displacement hardly change. One
-    factor for all pressures would also unload spots to which nothing was added.
-    """
-    columns = np.arange(0, p.shape[1], CELL)
-    for top in range(0, p.shape[0], CELL):
-        row = p[top : top + CELL]
-        loads = np.add.reduceat((row - box.lowest).sum(axis=0), columns)
-        excess = np.add.reduceat(added[top : top + CELL].sum(axis=0), columns)
-        shares = np.divide(excess, loads, out=np.zeros_like(loads), where=loads > 0.0)
-        left = 1.0 - np.clip(shares, 0.0, MOST_TAKEN)
-        _stretch(row, box.lowest, np.repeat(left, CELL)[: p.shape[1]])
-
-
 def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> None:
     """Scale an admissible p from its sum `load` to the wanted sum `total`; collective.
 
@@ -136,7 +114,7 @@ def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> 
         _scale_free(slab, box, p, total - even)
 
 
-def _stretch(p: Array, lowest: float, factor: Array | float) -> None:
+def _stretch(p: Array, lowest: float, factor: float) -> None:
     """Multiply the part of p above `lowest` by a factor."""
     if lowest:
         p -= lowest

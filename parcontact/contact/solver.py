@@ -14,9 +14,8 @@ and `C` = subtract the mean over it, one iteration is:
 3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction, and corrects for a last
    step that was not exact. beta is 0, so that t = z, if f falls much less along `z + beta t` than along z, or if the
    bounds cut off much of the last step.
-4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the limits add much load, this load is
-   first removed near the points where it was added (`problem.take_back`). If the hardness is far below the stiffness,
-   alpha is limited, so that few pressures change from one bound to the other.
+4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the hardness is far below the
+   stiffness, alpha is limited, so that few pressures change from one bound to the other.
 5. f must not rise. Otherwise the step is halved, and the direction is forgotten.
 
 The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
@@ -42,7 +41,7 @@ from ..physics.records import Certificate
 from . import kernels
 from .certificate import Iterate, certify, form_iterate
 from .preconditioner import ALL, ExtendedPreconditioner, Grids
-from .problem import Contact, Problem, Workspace, scale_to_load, take_back
+from .problem import Contact, Problem, Workspace, scale_to_load
 
 # tuning
 MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate
@@ -54,7 +53,7 @@ MAX_STEP_RATIO_FREE = 2.0  # the same in a free box, or with a `further` precond
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # iterations without a smaller certificate after which steps are exact
 LEAST_DESCENT = 0.5  # least slope along t over that along z; below it the last direction is forgotten
 REACH = 4.0  # largest change of a pressure in one step, over the highest admissible pressure
-LARGE_CUT = 0.003  # share of the load; if more is cut off, it is taken back near by, and the direction is forgotten
+LARGE_CUT = 0.003  # share of the load; if more is cut off, the direction is forgotten
 # accuracy
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of <p, A p>/2 below which a rise of f is rounding
 LEAST_LOAD = float(np.finfo(np.float64).tiny)  # least mean pressure that maps can represent; less counts as none
@@ -217,11 +216,6 @@ class ContactSolver:
             sums = kernels.advance(old_p, work.direction, step, box.lowest, box.highest, p)
             load, cut = self.slab.sum(*sums)
             if mean is not None:
-                if cut > LARGE_CUT * load and halvings == 0:
-                    added = np.multiply(step, work.direction, out=work.other_displacement)
-                    added += p - old_p
-                    take_back(box, p, added)
-                    (load,) = self.slab.sum(kernels.sum_of(p))
                 scale_to_load(self.slab, box, p, load, mean * self.slab.points)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from parcontact.contact import kernels
-from parcontact.contact.problem import CELL, MOST_TAKEN, Box, scale_to_load, take_back
+from parcontact.contact.problem import Box, scale_to_load
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 
@@ -118,16 +118,3 @@ def test_scale_to_load(box: Box, share: float, dtype: type[np.floating]) -> None
     p.fill(box.lowest)
     scale_to_load(slab, box, p, float(p.sum()), total)
     np.testing.assert_allclose(p, total / slab.points, rtol=1e-14)
-
-
-@pytest.mark.parametrize("box", [Box(), Box(lowest=0.3)], ids=str)
-def test_added_load_is_taken_from_its_cell(box: Box, dtype: type[np.floating]) -> None:
-    """A cell with more added than MOST_TAKEN of its load loses this share; one without load, and others, lose none."""
-    p, added = np.full((CELL + 3, 2 * CELL + 5), 1.0 + box.lowest), np.zeros((CELL + 3, 2 * CELL + 5), dtype)
-    p[:CELL, CELL : 2 * CELL] = box.lowest
-    added[0, 0], added[1, CELL], added[CELL, 2 * CELL] = 0.25 * CELL**2, 1.0, 12.0
-    expected = p.copy()
-    expected[:CELL, :CELL] -= 0.25
-    expected[CELL:, 2 * CELL :] -= MOST_TAKEN  # of 15 points
-    take_back(box, p, added)
-    assert np.abs(p - expected).max() <= 1e-15
