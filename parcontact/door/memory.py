@@ -11,8 +11,7 @@ load may jump at the start of a stage: the cost of later steps is that of the tr
 half of the time is over before a job has made enough steps, its steps are counted and timed on a quarter of the points
 along each side. The transforms that the job made on its own grid before then give the ratio of times of both grids.
 
-Times are processor times without those in which a rank waits for others: MPI waits in a busy loop, for as long as other
-programs use the processor of the other rank.
+Times are processor times. They contain the waits of a rank for others, in which MPI is busy.
 """
 
 import math
@@ -49,7 +48,6 @@ from ..march.rigid_surface import highest_waves
 from ..march.scene import Scene, build_on, outline, solver_on_tiles
 from ..march.state import parts_of
 from ..march.steady import SteadySliding
-from ..parallel.mpi import MPI
 from ..parallel.slab import Slab, Tally
 from ..physics.convolution import SIDE, Convolution, MirroredConvolution, Tiles
 from ..physics.loops import shape_of
@@ -205,36 +203,6 @@ class OutOfTimeError(Exception):
     """Raised on all ranks when the time of a trial is used up."""
 
 
-class WaitingRanks(MPI.Intracomm):
-    """A communicator that sums the processor time [s] in which this rank waits for the others."""
-
-    waited = 0.0
-
-    def _wait(self) -> None:
-        began = time.process_time()
-        self.Barrier()
-        self.waited += time.process_time() - began
-
-
-def _after_waiting(name: str) -> Callable[..., Any]:
-    """Return the method of a communicator with this name, which first waits for all ranks."""
-
-    def call(ranks: WaitingRanks, *given: Any) -> Any:
-        ranks._wait()
-        return getattr(MPI.Intracomm, name)(ranks, *given)
-
-    return call
-
-
-for _name in ("Allgather", "Alltoallv", "allgather", "bcast"):  # what steps call
-    setattr(WaitingRanks, _name, _after_waiting(_name))
-
-
-def worked(slab: Slab) -> float:
-    """Return the processor time of this rank so far [s], without known times of waiting for other ranks."""
-    return time.process_time() - getattr(slab.comm, "waited", 0.0)
-
-
 class TimedSlab(Slab):
     """A slab that ends a trial: when the `process_time` of a rank has passed `end`, the next sum over ranks raises
     OutOfTimeError on all ranks, once.
@@ -247,7 +215,7 @@ class TimedSlab(Slab):
 
     def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
         if self.begun is None and self.tally["operator"]:
-            self.begun = worked(self), self.tally.copy()
+            self.begun = time.process_time(), self.tally.copy()
         *found, late = super().reduce(sums, [*maxima, float(time.process_time() > self.end)])
         if late:
             self.end = math.inf
@@ -264,7 +232,7 @@ class TimedSlab(Slab):
         for name, count in self.tally.since(tally).items():
             if match := re.match(r"fft (\d+)x(\d+) ", name):
                 work += count * _work(int(match[1]), int(match[2]))
-        return (worked(self) - before) / work if work else 0.0
+        return (time.process_time() - before) / work if work else 0.0
 
 
 def _work(nx: int, ny: int) -> float:
@@ -364,7 +332,7 @@ def try_job(job: Job, slab: Slab, seconds: float) -> Trial | None:
         if not slab.agree(fits):
             continue
         seconds /= 2.0
-        own = TimedSlab(WaitingRanks(slab.comm), *tried.grid.points)
+        own = TimedSlab(slab.comm, *tried.grid.points)
         found, price = _attempt(tried, own, seconds), slab.agree(own.price)
         if found:
             ratio = prices[0] / price if prices and price else 1.0
@@ -509,6 +477,6 @@ def _try(march: March, seconds: float) -> list[StageCost]:
 
 def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:
     """Return the time [s] and the counts of a call."""
-    before, began = slab.tally.copy(), worked(slab)
+    before, began = slab.tally.copy(), time.process_time()
     call()
-    return {"operator": 0, **slab.tally.since(before), "seconds": worked(slab) - began}
+    return {"operator": 0, **slab.tally.since(before), "seconds": time.process_time() - began}

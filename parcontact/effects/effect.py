@@ -76,7 +76,7 @@ class SolvedContact(Generic[Remembered]):
     where the surfaces touch.
 
     `numbers` are further results of the law, by their names. `pull` is the force of all tension [N]. Loads of at most
-    `least_load` [N] cannot be told from errors of the solver. `snapped` is True if the contact passed through states
+    `least_load` [N] may be errors of the solver. `snapped` is True if the contact passed through states
     without equilibrium. `remark` is a sentence for run.log, or ''. `end` is one of
 
     * "equilibrium";

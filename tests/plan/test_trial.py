@@ -83,25 +83,6 @@ def test_a_disturbed_step_does_not_lengthen_the_others() -> None:
     assert stage.total("seconds") == pytest.approx(150.0)
 
 
-@pytest.mark.mpi(2)
-def test_waiting_for_other_ranks_is_no_work(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each wait takes 1000 s of processor time here, and the rest 2 ms whenever the clock is read."""
-    clock = [0.0]
-
-    def read() -> float:
-        clock[0] += 2e-3
-        return clock[0]
-
-    def wait(ranks: memory.WaitingRanks) -> None:
-        clock[0] += 1000.0
-
-    monkeypatch.setattr(time, "process_time", read)
-    monkeypatch.setattr(memory.WaitingRanks, "Barrier", wait)
-    seen = try_job(job(material=TWO, history=[CELLS]), Slab(comm, 48, 40), math.inf)
-    assert seen is not None
-    assert 0.0 < seen.building + seen.total("seconds") < 1000.0
-
-
 def test_every_stage_is_tried_in_the_time_given(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three long ones get some steps each; what is not tried costs as much as what was, and first steps count once."""
     ticking(monkeypatch)
@@ -123,9 +104,6 @@ def test_a_job_without_time_for_its_steps_is_tried_on_fewer_points(
     """The clock ends its first solve on all ranks. Its steps are those of its own grid, and so is the price of its
     transforms; ranks share what is not the overhead of a call."""
     ticking(monkeypatch)
-    monkeypatch.setattr(
-        memory.WaitingRanks, "_wait", lambda ranks: None
-    )  # reads the clock as often as there are messages
     large = job(grid={"points": 256}, material=TWO, history=[CELLS], numerics={"tolerance": 1e-8})
     ends, attempt = list[float](), memory._attempt
 
