@@ -1,7 +1,7 @@
 """Predictions of Persson's theory for a job with one rough surface: friction and contact area at each instant."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -23,7 +23,7 @@ from ..job import Job
 from ..job.history import Span, Timeline
 from ..march import scene
 from ..march.curve import Request, request
-from ..parallel.slab import Slab
+from ..parallel.slab import Array, Slab
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..theory import persson, wavy
@@ -295,8 +295,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
-    limits, line = (k_long, k_short, slide, (k_rolloff,)), 1 in job.grid.points
-    unit = persson.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits, line=line)
+    unit = _rings_on_grid(job, shape.density, (k_long, k_short), slide, (k_rolloff,))
     amplitude, kx, ky = unit.waves
     power = np.abs(amplitude) ** 2 / 2
     if part.rms_slope is not None:
@@ -304,10 +303,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     elif part.rms_height is not None:
         factor = part.rms_height / math.sqrt(np.sum(power))
     else:
-        norm = 2 / job.grid.size[job.grid.points.index(1)] if line else 1.0  # m^4 to m^3; k stands for k and -k
-        factor = math.sqrt((part.psd_constant or 0.0) * norm)
-    if job.grid.points[0] == 1:  # a profile along y
-        unit = replace(unit, waves=wavy.Waves(amplitude, ky, kx))
+        factor = math.sqrt(part.psd_constant or 0.0)
     return unit.scaled(factor)
 
 
@@ -322,7 +318,24 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
     if ends[0] >= EDGE * ends[1]:
         raise InputError("surface: the theory needs waves that fit the box and the grid, the spectrum has none")
     kinks = found.q[(found.q > ends[0]) & (found.q < ends[1])].tolist()
-    return persson.rings_of_spectrum(lambda k: np.asarray(found(k), float), *ends, slide, kinks)
+    return _rings_on_grid(job, found, ends, slide, kinks)
+
+
+def _rings_on_grid(
+    job: Job, density: Callable[[Array], Array], ends: tuple[float, float], slide: float, kinks: Sequence[float]
+) -> Rings:
+    """Return the waves of a spectrum [m^4] between the wavenumbers `ends` [rad/m] on the grid of a job.
+
+    On one row or column of points all waves lie along it. The mean square of a wave is then the spectrum over the area
+    of the box, which belongs to k and to -k.
+    """
+    line = 1 in job.grid.points
+    norm = 2 / job.grid.size[job.grid.points.index(1)] if line else 1.0
+    rings = persson.rings_of_spectrum(lambda k: norm * np.asarray(density(k), float), *ends, slide, kinks, line=line)
+    if job.grid.points[0] > 1:
+        return rings
+    amplitude, kx, ky = rings.waves
+    return replace(rings, waves=wavy.Waves(amplitude, ky, kx))
 
 
 # -- the history ------------------------------------------------------------------------------------------------------
