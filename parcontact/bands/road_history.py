@@ -230,11 +230,23 @@ class RoadHistory(RoadSliding):
         """Return the track of a band at each pressure of its ladder."""
         return self._tracks[band, sample]
 
-    def try_march(self) -> None:
-        """March the finest band at the middle pressure of its ladder to measure the time; on this rank alone."""
-        last = self.cut.count - 1
+    def plan(self) -> Iterator[str]:
+        """Yield lines on the bands, and on the number of marches and their time. The time of a step is measured in a
+        march of the finest band at the middle pressure of its ladder."""
+        yield from self.notes()
+        tasks, steps, last = self.tasks(), self.steps(), self.cut.count - 1
         middle = len(self._hard.ladders[last].rungs) // 2
+        began = time.process_time()
         self._march_alone(dict.fromkeys(self.samples), RungTask(last, 0, middle, True))
+        each = self.slab.agree((time.process_time() - began) / steps[-1])
+        for of_band in tasks:
+            number, count = of_band[0].band, len(of_band)
+            long, short = self.cut.wavelengths(number)
+            yield f"band from {long:.3g} to {short:.3g} m: {count} march{'es' * (count > 1)} of {steps[number]} steps"
+        size = self.slab.comm.size
+        seconds = each * sum(-(-len(of_band) // size) * steps[of_band[0].band] for of_band in tasks)
+        step, ranks = f"{each * 1e3:.3g} ms a step", f"{size} rank{'s' * (size > 1)}"
+        yield f"parcontact: {sum(map(len, tasks))} marches, {step}; on {ranks}: {seconds:.3g} s"
 
     def march(self, after: After) -> None:
         """March all bands in rounds of one march per rank.
@@ -392,6 +404,12 @@ class RoadHistory(RoadSliding):
         """Return True if a band slides steadily, or rests, at the end of a stage."""
         made = self.job.history[stage]
         return not made.speed or made.seconds * made.speed >= SETTLED * self.cut.wavelengths(number)[0]
+
+
+def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
+    """Yield lines on the bands of a job and on the time of its points or marches; collective: all ranks must take every
+    line."""
+    yield from (RoadHistory if job.history else RoadSliding)(job, slab).plan()
 
 
 def halved(rungs: Sequence[T]) -> Sequence[T]:

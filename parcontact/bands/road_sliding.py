@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..columns import BANDS, choose_columns, names_of
+from ..contact.problem import Box
 from ..effects.branches import relaxation_of, temperature_of
 from ..errors import Doubt, RunError, UnsolvedError
 from ..files import outputs
@@ -17,13 +18,13 @@ from ..job import Job
 from ..job.listing import answers
 from ..march.budget import ErrorBudget, ErrorParts
 from ..march.choices import choices
-from ..march.curve import States, on_one_grid
+from ..march.curve import States, on_one_grid, request
 from ..march.scene import Setup
 from ..march.steady import Point, direction_of
 from ..parallel.slab import Array, Slab
 from ..physics.records import Certificate, Measures
 from .band import Rung, Vector
-from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
+from .cascade import BandResult, Cascade, Results, Solved, Task, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands
 
 MOST_ROUNDS = 20  # tuning: limit on rounds of the loops of effects
@@ -133,6 +134,23 @@ class RoadSliding:
     def notes(self) -> list[str]:
         """Return sentences on the chosen bands."""
         return describe_cut(self.cut, self.job)
+
+    def plan(self) -> Iterator[str]:
+        """Yield lines on the bands, and on the number of contacts and their time, which a short trial measures."""
+        yield from self.notes()
+        wanted, cascade = request(self.job), self._cascade
+        began, contacts = time.perf_counter(), 0
+        cascade.press(wanted.velocity(max(wanted.velocities)), wanted.pressures[0])
+        for number in sorted({0, self.cut.count // 2, self.cut.count - 1}):
+            rungs = range(len(cascade.ladders[number].rungs))
+            cascade.solve_tasks([Task(number, 0, rung, Box()) for rung in rungs])
+            contacts += len(rungs)
+        each = self.slab.agree((time.perf_counter() - began) / contacts)
+        samples = self.cut.samples or FEWEST
+        of_point = (samples + 1) * sum(len(ladder.rungs) for ladder in cascade.ladders)
+        points, size = len(wanted.points), self.slab.comm.size
+        yield f"parcontact steady: {points} steady states of {of_point} contacts or more, {each * 1e3:.3g} ms each"
+        yield f"on {size} rank{'s' * (size > 1)}: {points * of_point * each:.3g} s or more in all"
 
     def keep_in(self, directory: Path) -> str:
         """Store contacts in a file of this directory until their point of the curve is written. Return, on root, a

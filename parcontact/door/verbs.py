@@ -298,7 +298,7 @@ def plan(options: argparse.Namespace) -> int:
     doubts = on_root(world, lambda: sentences_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, cores()}), options.seconds, started)
     if chosen[0].job.bands is not None:
-        from ..bands.band_plan import plan_bands
+        from ..bands.road_history import plan_bands
 
         head = [f"first of {len(chosen)} cases:"] * (len(chosen) > 1)
         lines: Iterator[str] = chain(head, plan_bands(chosen[0].job, Slab(world, 1, 1)))

@@ -11,8 +11,8 @@ import yaml
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
+from parcontact.bands.road_history import plan_bands
 from parcontact.effects.heat.bands import flash_of_bands
 from parcontact.effects.heat.solver import Flash
 from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
