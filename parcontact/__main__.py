@@ -19,7 +19,7 @@ from .door.arguments import parse_arguments, without_restart
 from .errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, InputError, JobError, RunError
 from .files import files
 from .parallel.root import STOP
-from .streams import describe_loss, tolerant_streams
+from .printed import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # delay of the other ranks before they print, so that root prints a common error first [s]
 WAIT_SECONDS = 5.0  # longest time that a failing rank waits for the others to fail with the same error [s]

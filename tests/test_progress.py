@@ -10,7 +10,7 @@ from time import sleep
 import pytest
 from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
-from parcontact import streams
+from parcontact import printed
 from parcontact.__main__ import main
 from parcontact.files.recorder import Console, StepRow
 from parcontact.results import report_sections
@@ -38,7 +38,7 @@ def stated(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) 
 
 def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    items = streams.with_bar([1, 2, 3], "maps", "map")
+    items = printed.with_bar([1, 2, 3], "maps", "map")
     assert next(items) == 1
     assert "maps:   0%" in terminal.getvalue()
     assert "0/3" in terminal.getvalue()

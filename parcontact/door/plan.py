@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .. import streams
+from .. import printed
 from ..job import Case, Job
 from ..job.history import Timeline
 from ..job.listing import find_effects
@@ -195,7 +195,7 @@ class Planner:
 
     def _describe(self, job: Job, slab: Slab, trials: int) -> Iterator[str]:
         """Yield lines on the costs of the steps of a job, or of its steady states; collective."""
-        bar = streams.Bar(1, "trying some steps of the job", "trial", slab.root)
+        bar = printed.Bar(1, "trying some steps of the job", "trial", slab.root)
         try:
             found = try_job(job, slab, self._left(slab, trials))
         finally:

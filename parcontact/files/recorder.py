@@ -26,7 +26,7 @@ from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget
 from ..parallel.slab import Array
 from ..physics.records import Certificate, Measures
-from ..streams import printable
+from ..printed import printable
 from . import fields, files, hdf5, outputs
 from .checkpoint import Contents, TableMark
 from .directory import Directory

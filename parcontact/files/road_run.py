@@ -22,9 +22,9 @@ from ..job.history import reached
 from ..march.budget import SHOWN, exceeds
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
+from ..printed import Bar
 from ..results import slide
 from ..results.results import Results
-from ..streams import Bar
 from . import files, hdf5, outputs, provenance, recorder
 from .directory import ADVICE, Directory
 from .outputs import Claim

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from .. import streams
+from .. import printed
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..errors import DONE, FAILED, STOPPED_EARLY, Doubt, InputError, Kind, RunError, UnsolvedError
 from ..files import files, hdf5, outputs, tables, wisdom
@@ -66,7 +66,7 @@ class CurveTable:
             self._keep_known(directory / further[0], heated)
         self._further = GrowingTable(directory / further[0], further[1]) if further else None
         self._points: list[Point] = []
-        self._bar = streams.Bar(0, "")
+        self._bar = printed.Bar(0, "")
         if self._job.origin.mesh:
             self.say(self._job.origin.mesh)
         if not heated and (text := describe_temperature(self._job.material)):
@@ -109,7 +109,7 @@ class CurveTable:
         if again := sorted({*bare} - {*found}):
             self.say(f"{len(again)} of these are solved again, for their maps")
             found = sorted([*found, *again])
-        self._bar = streams.Bar(len(found), "steady states", "point", not self.quiet)
+        self._bar = printed.Bar(len(found), "steady states", "point", not self.quiet)
         return found
 
     @property

@@ -23,7 +23,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from .. import job as jobs
-from .. import printed, streams
+from .. import printed
 from ..bands.band import Band
 from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
 from ..columns import TABLES
@@ -418,7 +418,7 @@ def _refuse_links(directory: Path) -> None:
 
 
 def render(directories: Sequence[Path]) -> str:
-    each = [describe_directory(directory) for directory in streams.with_bar(directories, "chapters", "chapter")]
+    each = [describe_directory(directory) for directory in printed.with_bar(directories, "chapters", "chapter")]
     chapters = [*compare_directories(directories), *each]
     loader = PackageLoader("parcontact", "results")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

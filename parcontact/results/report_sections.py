@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from .. import capabilities, printed, streams
+from .. import capabilities, printed
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import STEADY, SWEEP, UNITS
 from ..effects.branches import relaxation_of
@@ -368,7 +368,7 @@ def _browse_file(
 
 
 def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job, chosen: int) -> Browser:
-    counted = streams.with_bar(list(labels), f"maps of {name}", "map")
+    counted = printed.with_bar(list(labels), f"maps of {name}", "map")
     images = _in_few_colors(maps.draw_frames(file, name, labels, job, MAP_SIZE, MAP_DPI))
     pictures = [(to_uri(image, "image/png"), labels[index]) for index, image in zip(counted, images, strict=True)]
     return name, pictures, max(sum(index <= chosen for index in labels) - 1, 0)

@@ -33,8 +33,7 @@ from matplotlib.ticker import (
 from matplotlib.transforms import ScaledTranslation
 
 from ..files import files
-from ..printed import LONG_TIME, TIMES, prefixed
-from ..streams import printable
+from ..printed import LONG_TIME, TIMES, prefixed, printable
 
 Draw = Callable[[Axes], None]  # draws one panel
 

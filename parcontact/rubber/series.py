@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
-from .. import streams
+from .. import printed
 from ..errors import InputError
 from .moduli import Kind, Measurement, Set, scatter
 from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
@@ -315,7 +315,7 @@ def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Ar
     goal, deviation = spectrum.modulus(omega)
     least, measured = min(max(1, math.ceil(decades)), MOST), slice(within.size)
     allowed = np.hypot(error, np.minimum(deviation[measured], error))
-    for count in streams.with_bar(range(least, MOST + 1), "number of branches", "branch"):
+    for count in printed.with_bar(range(least, MOST + 1), "number of branches", "branch"):
         tried = [_short(omega, goal, _times(data.rates, count, spare)) for spare in ENDS]
         distances = [_distance(omega[measured], goal[measured], allowed, *each) for each in tried]
         found = tried[int(np.argmin(distances))]
@@ -480,7 +480,7 @@ class _Search:
         ranges = ENERGIES if self.law == "arrhenius" else WLF_CONSTANTS
         grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
         first = Density(EXPANSION, self.reference)
-        points = streams.with_bar(grid, "shift with temperature", "law")
+        points = printed.with_bar(grid, "shift with temperature", "law")
         tried = (self._residuals(replace(self._named(point), vertical=first), COARSE) for point in points)
         errors = [float(np.mean(residuals**2)) for residuals in tried]
         if min(errors) >= FAR**2:

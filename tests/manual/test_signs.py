@@ -10,8 +10,7 @@ import re
 import pytest
 from marched_jobs import ROOT
 
-from parcontact.printed import quantity, with_error
-from parcontact.streams import TolerantStream
+from parcontact.printed import TolerantStream, quantity, with_error
 
 WRITTEN = [(ROOT / "parcontact", "*.py"), (ROOT / "parcontact", "*.md"), (ROOT / "parcontact", "*.ipynb")]
 WRITTEN += [(ROOT / "parcontact", "*.jinja"), (ROOT / "jobs", "*.md"), (ROOT / "scripts", "*.py"), (ROOT, "README.md")]
@@ -21,7 +20,7 @@ WRONG = re.compile(
     r"|(?<=[\d}] )u[mNsJ]\b|\[u[mNsJ]\]"  # 3 um, {x} um, [um]
     r"|(?<=\d )[μ][mNsJ]\b"
 )
-OTHERS = {"map_files.py", "fault.py", "streams.py"}  # take other forms from users, or give them to terminals
+OTHERS = {"map_files.py", "fault.py", "printed.py"}  # take other forms from users, or give them to terminals
 
 
 def find_other_forms(text: str) -> list[str]:
