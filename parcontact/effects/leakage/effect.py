@@ -125,7 +125,7 @@ class Seal(LeakageColumns):
         return SealColumns((math.nan,) * len(self.columns), self._scene.slab.zeros())
 
     def follow(self, instant: Instant, memory: Any) -> Changes[Any]:
-        from .fluid_pressure import pressure_of
+        from .seal_law import pressure_of
 
         numbers, step = instant.solved.numbers, instant.step
         drop = drop_at(self._scene.job, step.stage, step.time)
