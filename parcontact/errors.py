@@ -1,7 +1,8 @@
 """Errors that end the program with a sentence, and warnings as data (kind, place, numbers) with their sentences.
 
 Code that checks a job, a surface or a contact returns warnings as `Doubt` objects. Each `Kind` of warning is defined
-next to the code that checks for it. No code compares or parses the sentences.
+next to the code that checks for it. No code compares or parses the sentences. The warnings of the cases of a sweep are
+collected by subject, so that each subject is shown once, with its cases.
 """
 
 import math
@@ -10,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .printed import per_cent, quantity, rounded_down, rounded_up
+from .printed import name_cases, per_cent, quantity, rounded_down, rounded_up
 
 DONE, FAILED, BAD_INPUT, STOPPED_EARLY = range(4)  # exit codes; stopped early: with a good checkpoint, run again
 
@@ -86,6 +87,43 @@ class Kind:
 
     def __call__(self, place: str = "", numbers: Mapping[str, object] = NO_NUMBERS) -> Doubt:
         return Doubt(self.name, place, numbers, self.sentence)
+
+
+# first warning of each subject, and the numbers of its cases
+Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
+
+
+class SweepWarnings:
+    """Warnings of a sweep by subject. Subjects of the warnings `shown` before are not shown again. Others are shown
+    immediately if `at_once` is True, else at the end."""
+
+    def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
+        self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1
+        self.kinds: Kinds = {}
+
+    def begin(self, case: int) -> None:
+        """Set the case to which the following warnings belong."""
+        self._case = case
+
+    def shows(self, doubt: Doubt) -> bool:
+        """Record a warning; return True if it is shown now."""
+        if doubt.subject in self._shown:
+            return False
+        _, cases = self.kinds.setdefault(doubt.subject, (doubt, []))
+        new = not cases
+        if self._case not in cases:
+            cases.append(self._case)
+        return new and self._at_once
+
+    def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
+        """Return the messages at the end: warnings that were not yet shown, or that several cases have. `of_groups` has
+        the attribute `kinds` of each group of ranks."""
+        whole: Kinds = {}
+        for kinds in of_groups:
+            for subject, (doubt, cases) in kinds.items():
+                whole.setdefault(subject, (doubt, []))[1].extend(cases)
+        found = [(doubt, sorted(cases)) for doubt, cases in whole.values() if len(cases) > 1 or not self._at_once]
+        return [f"{doubt} ({name_cases(cases)})" for doubt, cases in found]
 
 
 class ParcontactWarning(UserWarning):

@@ -32,7 +32,7 @@ from scipy.optimize import brentq
 
 from ..columns import STUDY, names_of
 from ..errors import BAD_INPUT, FAILED, STOPPED_EARLY, InputError
-from ..files import files, outputs, run, sweep, sweep_warnings, tables
+from ..files import files, outputs, run, sweep, tables
 from ..files.directory import Directory
 from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
@@ -420,7 +420,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
         known = slab.agree(directory.claim is not None)
         directory.make(job.path, job.resolved(), outputs.Claim(outputs.kept(plain)))
         several = list(cases.values())
-        shown = on_root(slab.comm, lambda: sweep_warnings.warn_once(several))
+        shown = on_root(slab.comm, lambda: sweep.warn_once(several))
         warm_up(several[0].job, slab)
         stop = on_root(slab.comm, lambda: sweep.stop_file(several))
 

@@ -125,12 +125,12 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     cases, chosen = on_root(world, lambda: cases_of(options))
     if not cases[0].settings:
         return act(options, cases[0].job, Slab(world, *cases[0].job.grid.points), always)
-    from ..files import stopping, sweep, sweep_warnings
+    from ..files import stopping, sweep
     from ..parallel.slab import Groups
     from .memory import count_side_by_side
 
     on_root(world, lambda: sweep.refuse_foreign_sweep(cases))
-    shown = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
+    shown = on_root(world, lambda: sweep.warn_once(chosen)) if runs and len(chosen) > 1 else ()
     afresh = getattr(options, "restart", "") == "never" or not runs
     groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
     limit = stopping.limit_time(getattr(options, "wall", None))
@@ -211,8 +211,8 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
 def check(options: argparse.Namespace) -> int:
     """List all mistakes of a job, or all its keys with every default."""
     from .. import job as parcontact_job
-    from ..files.sweep_warnings import sentences_of
     from ..job.history import describe_steps
+    from ..job.reading import sentences_of
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
@@ -288,7 +288,7 @@ def plan(options: argparse.Namespace) -> int:
     world = start_ranks()
     from itertools import chain
 
-    from ..files.sweep_warnings import sentences_of
+    from ..job.reading import sentences_of
     from ..parallel.slab import Groups, Slab
     from .memory import count_side_by_side
     from .plan import Planner

@@ -9,10 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TextIO
 
-from ..errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, Doubt, InputError, InUseError, RunError
+from ..errors import BAD_INPUT, DONE, FAILED, STOPPED_EARLY, Doubt, InputError, InUseError, RunError, SweepWarnings
 from ..job import Case, Job
 from ..job.listing import plain_job
-from ..job.reading import CASES
+from ..job.reading import CASES, sentences_of
 from ..march.budget import exceeds
 from ..parallel.root import Signals
 from ..parallel.slab import Groups, Slab
@@ -22,7 +22,6 @@ from ..results.results import Results
 from . import files, outputs, stopping
 from .directory import refuse_files, refuse_other_jobs
 from .stopping import StopFile
-from .sweep_warnings import SweepWarnings
 
 ELSEWHERE = -1  # in place of an exit code: another program runs the case
 ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", BAD_INPUT: "refused", ELSEWHERE: "passed over"}
@@ -232,6 +231,13 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
         refuse_other_jobs(there, outputs.sound_claims(there), plain_job(case.job))
     if not claims and not {CASES, outputs.SWEEP.table} & set(entries):
         refuse_files(directory, entries)
+
+
+def warn_once(cases: Sequence[Case]) -> list[Doubt]:
+    """Print the warnings about the jobs of cases, one per subject; root only. Returns all warnings."""
+    for text in sentences_of(cases, lambda job: job.doubts):
+        print(f"warning: {text}", file=sys.stderr, flush=True)
+    return [doubt for case in cases for doubt in case.job.doubts]
 
 
 def stop_file(cases: Sequence[Case]) -> StopFile:

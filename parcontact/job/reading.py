@@ -4,7 +4,8 @@ The data of a job are those of its file after overrides (`--set`) and the settin
 The stored job of an output directory is read as far as pictures and texts need it.
 
 A sweep is a list of mappings from keys of the job to lists of values. Keys within one mapping change together; cases
-are all combinations of the mappings, numbered from 0, with the last mapping changing fastest.
+are all combinations of the mappings, numbered from 0, with the last mapping changing fastest. Warnings about the cases
+are shown once for each subject.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from .. import capabilities
-from ..errors import InputError, JobError
+from ..errors import Doubt, InputError, JobError, SweepWarnings
 from . import yaml_text
 from .model import NO_GRID, Job
 from .parts import Included, Origin, log_range
@@ -404,6 +405,21 @@ def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
     if not 0 <= number < len(cases):
         raise InputError(f"--case {number}: the sweep has {len(cases)} cases, numbered from 0")
     return cases[number : number + 1]
+
+
+def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]) -> list[str]:
+    """Return the warnings about the jobs of cases as sentences, one per subject, with the cases if there are
+    several."""
+    if len(cases) == 1:
+        return list(dict.fromkeys(map(str, doubts(cases[0].job))))
+    noted = SweepWarnings(at_once=False)
+    for case in cases:
+        noted.begin(case.number)
+        for doubt in doubts(case.job):
+            noted.shows(doubt)
+    jobs = [case.job for case in cases]
+    between = dict.fromkeys(asked for job in jobs for asked in job.asked("doubt_cases"))
+    return [*noted.summary([noted.kinds]), *(str(doubt) for asked in between for doubt in asked(jobs))]
 
 
 def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistake:

@@ -13,8 +13,8 @@ from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, ad
 from parcontact.effects.adhesion.section import law_of
 from parcontact.effects.effect import SolvedContact
 from parcontact.errors import InputError
-from parcontact.files.sweep_warnings import sentences_of
 from parcontact.job import Job
+from parcontact.job.reading import sentences_of
 from parcontact.march import sanity
 from parcontact.march.budget import ENERGY
 from parcontact.march.mesh import load, load_cases
