@@ -1,25 +1,227 @@
-"""Leakage: the flow of a fluid through the gap of the contact during a run (`effects.leakage.flow`)."""
+"""Leakage: the flow of a fluid through the gap of the contact during a run (`effects.leakage.flow`).
+
+This module has the `leakage` section of a job, the pressures of the fluid in the stages of its history, and the effect.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ...columns import added_by
 from ...contact.problem import Mask
 from ...job import limits
-from ...job.parts import Part, Rule
-from ...job.stages import Stage
+from ...job.parts import Count, NonNegative, Part, Positive, Rule, rules_of
+from ...job.stages import Ramp, Stage
+from ...job.yaml_text import Fault, quote, refuse
 from ...parallel.root import on_root
 from ...parallel.slab import Array
 from ...physics.records import Entry, Saved, Units
 from ..effect import Changes, ContactLaw, Decision, Detached, Effect, Instant, end_in
-from .flow import leak
-from .section import RULES, Leakage, SealStage, drop_at
+from .flow import FLUIDS, Fluid, PressureDrop, leak
+
+PAIR = "two pressures [HIGH, LOW] of zero or more [Pa]"
+ENDS: TypeAdapter[tuple[float, float]] = TypeAdapter(tuple[NonNegative, NonNegative])
+VISCOSITY: TypeAdapter[float] = TypeAdapter(Positive)
+Pair = tuple[float, float]
+
+
+def _pair(value: Any, info: ValidationInfo) -> Pair:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        refuse(Fault(f"must be {PAIR}, got {quote(value)}"))
+    high, low = ENDS.validate_python(tuple(value), context=info.context)
+    if high < low:
+        refuse(Fault(f"must be {PAIR}, the high one first, got {quote(value)}"))
+    return high, low
+
+
+def _fluid(value: Any, info: ValidationInfo) -> str | float:
+    if isinstance(value, str) and value in FLUIDS:
+        return value
+    try:
+        return VISCOSITY.validate_python(value, context=info.context)
+    except ValueError:
+        refuse(Fault(f"must be a fluid ({', '.join(FLUIDS)}) or a positive viscosity [Pa s], got {quote(value)}"))
+
+
+Pressures = Annotated[Pair, PlainValidator(_pair, json_schema_input_type=tuple[NonNegative, NonNegative])]
+
+
+@dataclass(frozen=True)
+class FluidRamp(Ramp):
+    """High and low pressure of the fluid [Pa], which change linearly from `start` to `end` within a stage."""
+
+    start: Pair  # type: ignore[assignment]
+    end: Pair  # type: ignore[assignment]
+
+    def at(self, fraction: float, seconds: float) -> Pair:  # type: ignore[override]
+        """Return the high and the low pressure [Pa] at a fraction of the stage. They are exact at both ends, and
+        constant after the stage."""
+        fraction = min(fraction, 1.0)
+        high, low = ((1 - fraction) * first + fraction * last for first, last in zip(self.start, self.end, strict=True))
+        return high, low
+
+
+def _ramp(value: Any, info: ValidationInfo) -> FluidRamp:
+    if isinstance(value, FluidRamp):
+        return value
+    if isinstance(value, dict) and value.keys() == {"from", "to"}:
+        return FluidRamp(_pair(value["from"], info), _pair(value["to"], info))
+    if isinstance(value, dict):
+        refuse(Fault(f"must be {PAIR}, or {{from: [HIGH, LOW], to: [HIGH, LOW]}}, got {quote(value)}"))
+    return FluidRamp(_pair(value, info), _pair(value, info))
+
+
+class SealStage(Stage):
+    """A stage of a history in which the fluid may carry a part of the load."""
+
+    fluid_pressures: Annotated[FluidRamp | None, PlainValidator(_ramp, json_schema_input_type=Any)] = Field(
+        default=None, description=f"{PAIR}, or {{from, to}}"
+    )
+
+
+def _only_total(load: str, **given: Any) -> Iterator[Fault]:
+    for key, value in given.items():
+        if value is not None and load == "net":
+            yield Fault("needs load: total; of a net load `parcontact leak --fluid --pressures` gives the flow", (key,))
+
+
+def _whole(load: str, every: int, pressures: Pair | None) -> Iterator[Fault]:
+    if load == "total" and every > 1:
+        yield Fault(f"must be 1 with load: total, as the fluid acts in every step, got {every}", ("every",))
+    if load == "total" and pressures is None:
+        yield Fault(f"is missing; with load: total it must be {PAIR}", ("pressures",))
+
+
+class Leakage(Part):
+    """The `leakage` section: the fluid, and the number of steps between two calculations of the flow.
+
+    With `load: total` the fluid carries a part of the load.
+    """
+
+    label: ClassVar[str] = "leakage"
+    every: Count = Field(default=1, description="a positive whole number of steps")
+    pressures: Pressures | None = Field(default=None, description=PAIR)
+    ambient: NonNegative | None = Field(default=None, description="a pressure [Pa] of zero or more")
+    fluid: Annotated[str | float, PlainValidator(_fluid, json_schema_input_type=str | Positive)] | None = Field(
+        default=None, description=f"a fluid ({', '.join(FLUIDS)}) or a positive viscosity [Pa s]"
+    )
+    load: Literal["net", "total"] = "net"
+
+    rules = (
+        Rule(("load", "pressures"), lambda load, given: _only_total(load, pressures=given)),
+        Rule(("load", "ambient"), lambda load, given: _only_total(load, ambient=given)),
+        Rule(("load", "fluid"), lambda load, given: _only_total(load, fluid=given)),
+        *rules_of(_whole),
+    )
+
+    def left_out(self) -> tuple[str, ...]:
+        return () if self.total else ("load",)  # so that a job without a fluid is written as it is given
+
+    @property
+    def total(self) -> bool:
+        """True if the fluid carries a part of the load."""
+        return self.load == "total"
+
+    @property
+    def substance(self) -> Fluid:
+        """The fluid; water by default."""
+        name = "water" if self.fluid is None else self.fluid
+        return FLUIDS[name] if isinstance(name, str) else Fluid("the fluid", name)
+
+    def drop(self, pressures: Pair) -> PressureDrop:
+        """Return the pressure drop of the fluid from a high to a low pressure [Pa]."""
+        assert self.pressures is not None
+        ambient = self.pressures[1] if self.ambient is None else self.ambient
+        return PressureDrop(self.substance, *pressures, True, ambient)
+
+    def drop_at(self, history: Any, stage: int, time: float) -> PressureDrop:
+        """Return the pressure drop of the fluid at a `time` [s] of the `history`, which is in the stage with the number
+        `stage`."""
+        lasts, given = history[stage].seconds, history[stage].fluid_pressures
+        if given is None:
+            return self.drop(self.before(history, stage))
+        started = sum(each.seconds for each in history[:stage])
+        return self.drop(given.at((time - started) / lasts if lasts else 1.0, lasts))
+
+    def before(self, history: Any, stage: int) -> Pair:
+        """Return the high and the low pressure [Pa] with which a stage of the `history` begins if it has none of its
+        own."""
+        given = (each.fluid_pressures for each in reversed(history[:stage]))
+        assert self.pressures is not None
+        return next((ramp.end for ramp in given if ramp is not None), self.pressures)
+
+
+def _needs_steps(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
+    if leakage is not None and not leakage.total and not history:  # `_no_steady` refuses a curve with a load: total
+        yield Fault("needs a history: the flow of a friction curve is not calculated", ("leakage",))
+
+
+def _stages(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
+    """Yield errors of the fluid's pressures in all stages, and of the directions in which stages slide."""
+    if leakage is None or any(stage is None for stage in history):
+        return
+    for number, stage in enumerate(history):
+        ramp, place = stage.fluid_pressures, ("history", number, "fluid_pressures")
+        if leakage.total and stage.velocity[0]:
+            sentence = "must be [0, vy] with leakage.load: total: a flow along the sliding, along x, is not solved for"
+            yield Fault(sentence, ("history", number, "velocity"))
+        if ramp is None:
+            continue
+        if not leakage.total:
+            yield Fault("needs leakage: {load: total}", place)
+            continue
+        before = leakage.before(history, number)
+        if not ramp.constant and not stage.seconds:
+            yield Fault("is a ramp, which needs a duration [s] or a distance [m]", place)
+        elif stage.seconds and ramp.start != before:
+            was, now = (f"[{high:g}, {low:g}]" for high, low in (before, ramp.start))
+            yield Fault(f"must begin with {was}, got {now}: a stage without duration makes a jump", place)
+
+
+def _no_free_box(leakage: Leakage | None, grid: Any) -> Iterator[Fault]:
+    if leakage is not None and leakage.total and not all(grid.cyclic):
+        yield Fault("must be periodic with leakage.load: total: the seal is one of many", ("grid", "boundary"))
+
+
+def _refused(leakage: Leakage | None, material: Any, numerics: Any) -> Iterator[Fault]:
+    if leakage is None or not leakage.total:
+        return
+    if material.hardness is not None:
+        yield Fault("cannot be used with leakage.load: total: leave one of them out", ("material", "hardness"))
+    if numerics.precision == "mixed":
+        yield Fault("must be double with leakage.load: total: gaps are small", ("numerics", "precision"))
+
+
+def _excludes(section: str) -> Rule:
+    def check(leakage: Leakage | None, other: Any) -> Iterator[Fault]:
+        sticks = section != "interface" or getattr(other, "stick", False)
+        if leakage is not None and leakage.total and other is not None and sticks:
+            yield Fault(f"cannot be used with {section}{'.stick' * (section == 'interface')}", ("leakage", "load"))
+
+    return Rule(("leakage", section), check)
+
+
+def _no_steady(leakage: Leakage | None, initial: Any, steady: Any) -> Iterator[Fault]:
+    if leakage is not None and leakage.total:
+        yield from limits.refuse_steady("leakage").check(leakage, initial, steady)
+
+
+def _has_map(leakage: Leakage | None, output: Any) -> Iterator[Fault]:
+    if leakage is None or not leakage.total:
+        yield from limits.no_field["fluid_pressure"](output)
+
+
+RULES = (
+    *rules_of(_needs_steps, _stages, _no_free_box, _has_map, _refused, _no_steady),
+    *map(_excludes, ("adhesion", "interface", "thermal")),
+)
+
 
 NOTHING = (math.nan, math.nan, math.nan)
 
@@ -127,8 +329,8 @@ class Seal(LeakageColumns):
     def follow(self, instant: Instant, memory: Any) -> Changes[Any]:
         from .seal_law import pressure_of
 
-        numbers, step = instant.solved.numbers, instant.step
-        drop = drop_at(self._scene.job, step.stage, step.time)
+        numbers, step, job = instant.solved.numbers, instant.step, self._scene.job
+        drop = job.section("leakage").drop_at(job.history, step.stage, step.time)
         pressure = pressure_of(drop, instant.solved.memory.share)
         warning = drop.describe_inertia("x", numbers["mass_flow"], numbers["bound"])
         columns = tuple(numbers[name] for name in self.columns)

@@ -58,7 +58,6 @@ from ..effect import (
     entries_of_end,
 )
 from .flow import Balance, PressureDrop, flow_mesh_error, least_section, solve_flow
-from .section import drop_at
 
 Map = NDArray[np.floating]
 SMALL = 1e-9  # accuracy: small leak over the mean of g^3
@@ -297,7 +296,8 @@ class SealLaw:
         fluid differs from ambient, contacts are solved to the job's tolerance or to SHARP, whichever is smaller, and
         `tolerance` is not used."""
         assert self._dry is not None
-        drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare
+        job, (share, gap) = self.scene.job, memory.spare
+        drop = job.section("leakage").drop_at(job.history, step.stage, step.time)
         flows = memory.flows or drop.high > drop.low
         spare, pressures = (memory.share, memory.gap), (drop.high, drop.low)
         now = SealMemory(share, gap, spare, pressures, trial.alpha, flows, memory.end)
