@@ -5,7 +5,7 @@ A map is read, cut to the box, treated (levelled, filled, made periodic), and re
 
 A measured spectrum is that of an isotropic surface: a table of C2D, the spectrum of the surface, or of C1D, the
 one-sided spectrum of profiles, at wavenumbers q = 2 pi/wavelength. Its columns are `q[1/m] C2D[m^4]` or `q[1/m]
-C1D[m^3]`, or the same in mm, um or nm. As in `physics.surface_statistics`, the mean square of the heights h is
+C1D[m^3]`, or the same in mm, um or nm. As in `physics.roughness`, the mean square of the heights h is
 
     <h^2> = int C2D d2q = int_0^inf C1D dq,
 

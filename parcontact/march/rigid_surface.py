@@ -290,7 +290,7 @@ WARN_OUTLIERS = Kind(
 def doubt_outliers(prepared: "Prepared") -> Iterator[Doubt]:
     """Yield a warning about outliers, if there are any and they are kept."""
     from ..job import measured_maps
-    from ..physics.surface_statistics import surface_statistics
+    from ..physics.roughness import surface_statistics
 
     odd, cut = prepared.treated.outliers, prepared.cut
     if not odd.any() or prepared.part.outliers == "clip":

@@ -40,8 +40,8 @@ from ..march import rigid_surface
 from ..march.sanity import excited_bands
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
-from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
+from ..physics.roughness import surface_statistics
 from ..printed import name_cases
 from . import info, plots, report_sections, style, surface_summary
 from .panels import Axis, Line, Panel, Shade
@@ -180,7 +180,7 @@ def road_section(job: Job) -> ReportSection:
     except InputError as error:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
     heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*remarks.notes, *map(str, remarks.doubts)]
-    found = surface_statistics.surface_statistics(heights, job.grid.size)
+    found = surface_statistics(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     waves = any(not isinstance(part, Indenter) for part in job.surface)
@@ -202,7 +202,7 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
         rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
-    found = surface_statistics.surface_statistics(heights, setup.grid.size)
+    found = surface_statistics(heights, setup.grid.size)
     pictures = _draw(surface_summary.Sketch(heights, setup.grid.size, found), ", coarsest band")
     tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), surface_summary.list_statistics(found))]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)

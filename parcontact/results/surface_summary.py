@@ -15,8 +15,7 @@ from ..files import files
 from ..job import Job, Topography, map_files, measured_maps
 from ..job.measured_maps import prepare
 from ..parallel.slab import Array
-from ..physics import surface_statistics
-from ..physics.surface_statistics import Statistics
+from ..physics.roughness import Statistics, surface_statistics
 from ..printed import per_cent, quantity, with_error
 from . import style
 from .panels import Axis, Colors, Line, Panel, drawn_points, picture
@@ -108,14 +107,14 @@ def describe_surface(
     may call this function. Raises InputError and RunError."""
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
-    found, part, measured = surface_statistics.surface_statistics(heights, job.grid.size), job.surface[0], None
+    found, part, measured = surface_statistics(heights, job.grid.size), job.surface[0], None
     lines = []
     whole = map_files.read_map(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
     if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
         prepared = prepare(part, job.grid, whole)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
         treated = measured_maps.treat(prepared.cut, part.detrend, "smooth")
-        measured = surface_statistics.surface_statistics(treated.heights, prepared.size)
+        measured = surface_statistics(treated.heights, prepared.size)
         lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
         lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")

@@ -22,7 +22,7 @@ from parcontact.march import rigid_surface, sanity, scene
 from parcontact.march.time_error import properties_of
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics import surface_statistics
+from parcontact.physics import roughness
 from parcontact.results import prediction
 from parcontact.theory import persson
 
@@ -106,7 +106,7 @@ def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     """
     q = np.geomspace(5e3, 4.0e5, 80)
     heights, _, _ = heights_of(load(tmp_path, table("q[1/m] C1D[m^3]", q, c1(q))))
-    own = surface_statistics.surface_statistics(heights, (L, L))
+    own = roughness.surface_statistics(heights, (L, L))
     chosen = (own.qx > 1.5e4) & (own.qx < 1.0e5)
     assert chosen.sum() > 8
     assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05, abs=0.0)
@@ -328,7 +328,7 @@ LENGTH = 1e-3
 def test_a_self_affine_road() -> None:
     """The exponent that it was made with, to 0.05; the square height is the integral of either spectrum."""
     heights = truth.rough(256, LENGTH, LENGTH, LENGTH / 100, 0.1, hurst=0.8)
-    found = surface_statistics.surface_statistics(heights, (LENGTH, LENGTH))
+    found = roughness.surface_statistics(heights, (LENGTH, LENGTH))
     assert found.hurst == pytest.approx(0.8, abs=0.05)
     assert found.rms_slope == pytest.approx(0.1, rel=1e-12)
     one = np.sum(found.psd_y) * 2 * np.pi / LENGTH
@@ -348,7 +348,7 @@ def test_hurst_exponent_of_a_part_of_a_surface(hurst: float, periodic: str) -> N
     for seed in range(8):
         waves = np.fft.fft2(np.random.default_rng(seed).standard_normal((2 * n, 2 * n))) * falls
         part = measured_maps.treat(np.fft.ifft2(waves).real[:n, :n], "tilt", periodic).heights
-        found = surface_statistics.surface_statistics(part, (LENGTH, LENGTH))
+        found = roughness.surface_statistics(part, (LENGTH, LENGTH))
         fits.append((found.hurst, found.hurst_error))
     values, errors = np.array(fits).T
     error = float(errors.mean())
@@ -360,14 +360,12 @@ def test_hurst_exponent_of_a_part_of_a_surface(hurst: float, periodic: str) -> N
 def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
     """Exponents of a power law that no self-affine surface has, 0 to 1, are not stated."""
     q = np.geomspace(1.0, 1e2, 24)
-    assert np.isnan(surface_statistics._fit_hurst(q, q ** (-2.0 * (1.0 + hurst)), q)[0])
-    assert surface_statistics._fit_hurst(q, q ** (-2.0 * (1.0 + 0.7)), q) == pytest.approx(
-        (0.7, 0.0), rel=1e-9, abs=1e-9
-    )
+    assert np.isnan(roughness._fit_hurst(q, q ** (-2.0 * (1.0 + hurst)), q)[0])
+    assert roughness._fit_hurst(q, q ** (-2.0 * (1.0 + 0.7)), q) == pytest.approx((0.7, 0.0), rel=1e-9, abs=1e-9)
 
 
 def test_white_noise_has_no_hurst_exponent() -> None:
-    found = surface_statistics.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
+    found = roughness.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
     assert np.isnan(found.hurst)
     assert found.nayak > 1.5  # of an isotropic random surface at least 1.5
 
