@@ -41,7 +41,7 @@ from ...march.steady import Point, count_octaves, in_rounds
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
 from ...physics.convolution import wavenumbers
-from .strain_table import Softened, strains_in_full_contact
+from .effect import Softened, strains_in_full_contact
 
 SHALLOW, DEEP = 0.2, 4.0  # accuracy: least depth times the largest wavenumber, largest depth times the smallest
 BEYOND = 4.0  # accuracy: ratio by which the depths of the integral (3) go beyond these

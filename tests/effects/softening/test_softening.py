@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from parcontact import job as jobs
 from parcontact.bands.road_sliding import RoadSliding
+from parcontact.effects.softening.effect import Softened, StrainTable
 from parcontact.effects.softening.steady import doubts_of_points, strains_at_octaves
-from parcontact.effects.softening.strain_table import Softened, StrainTable
 from parcontact.errors import InputError, JobError
 from parcontact.march import sanity, scene
 from parcontact.march.steady import Point, SteadySliding
