@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.door.simulation import Row
-from parcontact.effects.layer.response import Layer
+from parcontact.effects.layer.effect import Layer
 
 
 def last_row(job: dict[str, Any], comm: MPI.Intracomm = MPI.COMM_SELF) -> Row:

@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from parcontact.contact.preconditioner import ExtendedPreconditioner
-from parcontact.effects.layer.response import DECAY, Base, Layer, LongWavePreconditioner, LongWaves
+from parcontact.effects.layer.effect import DECAY, Base, Layer, LongWavePreconditioner, LongWaves
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace

@@ -12,7 +12,7 @@ from parcontact.contact.certificate import Judge
 from parcontact.contact.problem import Approach, Box, InterfaceLaw, MeanPressure
 from parcontact.contact.projected import Projected
 from parcontact.contact.splitting import LEVEL_EXCESS, RELAXATION, Acceleration, Splitting, _Given
-from parcontact.effects.layer.response import Layer
+from parcontact.effects.layer.effect import Layer
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
