@@ -31,7 +31,7 @@ import numpy as np
 from ..contact.problem import Box, Constraint, InterfaceLaw
 from ..errors import InputError, RunError
 from ..files import hdf5
-from ..files.provenance import PROGRAM
+from ..files.hdf5 import PROGRAM
 from ..job import Job, listing
 from ..parallel.slab import Array, Slab
 from .band import Band, PressureLadder, Rung, Vector, probes_of

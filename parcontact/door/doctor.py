@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from .. import capabilities, compiled
 from ..errors import RunError
-from ..files import provenance, run
+from ..files import recorder, run
 from ..files.recorder import StepRow
 from ..files.stopping import Options
 from ..job import Job, load
@@ -202,7 +202,7 @@ STEPS = 4  # tuning: steps of the run whose files are read back
 
 def describe_machine(comm: "MPI.Intracomm") -> Iterator[str]:
     """Yield lines on ranks, libraries and times, and warnings; collective: all ranks must exhaust the iterator."""
-    yield from provenance.lines(comm)
+    yield from recorder.machine_lines(comm)
     yield f"HDF5 {h5py.version.hdf5_version}"
     cores = len(os.sched_getaffinity(0))
     here = sum(name == os.uname().nodename for name in comm.allgather(os.uname().nodename))

@@ -31,7 +31,7 @@ from ..job import HeightArray
 from ..parallel.slab import Array, Slab
 from ..physics.records import Entry
 from . import files, hdf5
-from .provenance import Link, Provenance, read_chain
+from .hdf5 import Link, Provenance, read_chain
 
 FORMAT = 2
 TITLE = "parcontact checkpoint, format "

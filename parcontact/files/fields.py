@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from . import files, hdf5, tables
-from .provenance import Provenance
+from .hdf5 import Provenance
 
 COORDINATES = ("t", "y", "x", "step")
 UNITS = {column.name: column.unit for column in FIELDS if column.name not in COORDINATES}  # of maps

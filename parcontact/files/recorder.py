@@ -2,12 +2,16 @@
 
 * measures.csv: a row per step and one for the initial state, written by root; the columns of this table.
 * The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal.
+* The first lines of run.log: facts about the machine and the program, for diagnosis.
 * The growing files of a run: run.log, measures.csv and fields.h5, begun or continued.
 """
 
 import math
 import os
+import platform
 import re
+import shlex
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +28,7 @@ from ..capabilities import Column
 from ..columns import MEASURES, cells, choose_columns, names_of, values_of
 from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget
+from ..parallel.mpi import MPI
 from ..parallel.slab import Array
 from ..physics.records import Certificate, Measures
 from ..printed import printable
@@ -31,7 +36,7 @@ from . import fields, files, hdf5, outputs
 from .checkpoint import Contents, TableMark
 from .directory import Directory
 from .fields import FieldsFile
-from .provenance import Provenance
+from .hdf5 import PROGRAM, Provenance
 from .tables import MEND, GrowingTable, whole_lines
 
 
@@ -405,3 +410,30 @@ class Recorder:
         self.console.close()
         if self._measures:
             self._measures.close()
+
+
+BATCH_JOBS = ("SLURM_JOB_ID", "PBS_JOBID", "LSB_JOBID", "JOB_ID")
+GIGABYTE = 1e9
+
+
+def machine_lines(comm: MPI.Intracomm) -> Iterator[str]:
+    """Yield the lines of a log's header: version, host, command, MPI, ranks, batch job, and numbers of the machine."""
+    words = [os.path.basename(sys.argv[0]), *sys.argv[1:]]
+    yield f"{PROGRAM} on {socket.gethostname()}, process {os.getpid()}: {shlex.join(words)}"
+    yield f"in {os.getcwd()}"
+    library = MPI.Get_library_version().splitlines()[0].strip(" \0")
+    yield f"{comm.size} rank{'s' if comm.size > 1 else ''}, {library}; Python {platform.python_version()}"
+    if found := [f"{name} = {os.environ[name]}" for name in BATCH_JOBS if os.environ.get(name)]:
+        yield f"batch job: {', '.join(found)}"
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / GIGABYTE
+    load = ", ".join(f"{value:.2f}" for value in os.getloadavg())
+    cores = len(os.sched_getaffinity(0))
+    yield f"machine: {processor()}, {cores} of {os.cpu_count()} cores, {memory:.3g} GB of memory, load {load}"
+
+
+def processor() -> str:
+    try:
+        with open("/proc/cpuinfo") as file:
+            return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.machine()

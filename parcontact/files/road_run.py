@@ -25,10 +25,10 @@ from ..parallel.slab import Slab
 from ..printed import Bar
 from ..results import slide
 from ..results.results import Results
-from . import files, hdf5, outputs, provenance, recorder
+from . import files, hdf5, outputs, recorder
 from .directory import ADVICE, Directory
 from .outputs import Claim
-from .recorder import HEAD, Console, StepRow, step_line
+from .recorder import HEAD, Console, StepRow, machine_lines, step_line
 from .stopping import Options, watching
 
 RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
@@ -58,7 +58,7 @@ def run_history(job: Job, slab: Slab, options: Options) -> int:
             directory.clear()
         console = Console(directory.path / outputs.RUN.log, options.quiet) if slab.root else Console(speaks=False)
         try:
-            for text in provenance.lines(slab.comm) if slab.root else ():
+            for text in machine_lines(slab.comm) if slab.root else ():
                 console.log(text)
             for doubt in doubts:
                 console.warn(str(doubt), shown=options.shows(doubt))

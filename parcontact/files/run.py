@@ -25,12 +25,12 @@ from ..physics.records import Saved, part_of
 from ..printed import quantity
 from ..results import slide
 from ..results.results import Results
-from . import checkpoint, hdf5, outputs, provenance, recorder, restart, tables, wisdom
+from . import checkpoint, hdf5, outputs, recorder, restart, tables, wisdom
 from .checkpoint import Contents, Facts
 from .directory import Directory
+from .hdf5 import Link, Provenance, cite_lines, extend_chain
 from .outputs import Claim
-from .provenance import Link, Provenance, cite_lines, extend_chain
-from .recorder import Recorder, Recording
+from .recorder import Recorder, Recording, machine_lines
 from .restart import RestartPoint
 from .stopping import Options, Watch, watching
 
@@ -297,7 +297,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         facts = Facts(plain, provenance_of(job, slab, saved, tuple(map(str, doubts))), claim.id)
         recorder = _open_files(march, directory, claim, facts, origin, options)
         try:
-            for text in provenance.lines(slab.comm) if slab.root else ():
+            for text in machine_lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
             for doubt in doubts:
                 recorder.console.warn(str(doubt), shown=options.shows(doubt))

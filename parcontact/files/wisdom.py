@@ -21,7 +21,7 @@ from ..parallel import fft
 from ..parallel.fft import export_wisdom, import_wisdom, pyfftw
 from ..parallel.slab import Slab
 from . import files
-from .provenance import processor
+from .recorder import processor
 
 
 def gather(slab: Slab) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from ..errors import DONE, FAILED, STOPPED_EARLY, Doubt, InputError, Kind, RunEr
 from ..files import files, hdf5, outputs, tables, wisdom
 from ..files.directory import ADVICE, Directory
 from ..files.fields import SteadyMaps
-from ..files.provenance import Link, Provenance, cite_lines
+from ..files.hdf5 import Link, Provenance, cite_lines
 from ..files.recorder import Console
 from ..files.stopping import Options, Watch, always, watching
 from ..files.tables import GrowingTable, LostPoint, Wanted

@@ -15,7 +15,7 @@ from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
 from ..errors import Doubt, InputError
 from ..files import files, tables
-from ..files.provenance import PROGRAM
+from ..files.hdf5 import PROGRAM
 from ..files.tables import Wanted
 from ..job import load
 from ..job.listing import answers

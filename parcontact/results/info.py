@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .. import capabilities
 from ..errors import InputError
 from ..files import checkpoint, fields, files, hdf5, outputs
-from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
+from ..files.hdf5 import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
 from ..job import Job, Stage, yaml_text
 from ..job.listing import answers

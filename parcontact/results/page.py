@@ -29,8 +29,8 @@ from ..bands.choice import cut_bands, describe_cut, on_one_grid_of_all
 from ..columns import TABLES
 from ..effects.branches import relaxation_of
 from ..errors import InputError
-from ..files import files, hdf5, outputs, provenance
-from ..files.provenance import PROGRAM
+from ..files import files, hdf5, outputs
+from ..files.hdf5 import PROGRAM
 from ..files.recorder import WARNING, log_lines
 from ..job import Dma, Indenter, Job, Zener, listing
 from ..job.listing import plain_data
@@ -144,19 +144,19 @@ def origin_section(directory: Path, found: Log) -> ReportSection:
                 ]
                 runs = [
                     (str(one.runs), one.program, str(one.ranks), one.started, str(one.from_step))
-                    for one in provenance.read_chain(file)
+                    for one in hdf5.read_chain(file)
                 ]
         except (*hdf5.FAILURES, KeyError, ValueError):
             continue
         chain = ReportTable(("runs", "program", "ranks", "started", "from step"), runs, "runs that made the results")
         return ReportSection("Provenance", found.machine, [ReportTable(("of", "value"), rows), chain])
-    return ReportSection("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
+    return ReportSection("Provenance", found.machine or [f"This report was made by {PROGRAM}."])
 
 
 def list_citations(job: Job | None) -> ReportSection:
     """Return the section with the references to cite for a job's results."""
-    cited = provenance.cite_lines(plain_data(job)) if job else ()
-    return ReportSection("References to cite", [provenance.PROGRAM, *cited])
+    cited = hdf5.cite_lines(plain_data(job)) if job else ()
+    return ReportSection("References to cite", [PROGRAM, *cited])
 
 
 MOST_POINTS = 2**22  # most points of a surface that is computed for a report

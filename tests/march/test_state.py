@@ -12,7 +12,7 @@ from marched_jobs import begun, marched
 from parcontact.errors import InputError
 from parcontact.files import checkpoint
 from parcontact.files.checkpoint import Facts
-from parcontact.files.provenance import Link, Provenance
+from parcontact.files.hdf5 import Link, Provenance
 from parcontact.job.history import Timeline
 from parcontact.job.listing import plain_data
 from parcontact.march.loop import March, run_steps

@@ -17,7 +17,7 @@ from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Benc
 from parcontact.__main__ import main
 from parcontact.errors import InputError
 from parcontact.files import checkpoint, restart, tables
-from parcontact.files.provenance import read_budget
+from parcontact.files.hdf5 import read_budget
 from parcontact.files.run import chosen_by_accuracy
 from parcontact.job import Job
 from parcontact.results import info

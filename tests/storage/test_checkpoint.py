@@ -11,7 +11,7 @@ from mpi4py import MPI
 from parcontact.errors import InputError, RunError
 from parcontact.files import checkpoint, hdf5
 from parcontact.files.checkpoint import Contents, Facts
-from parcontact.files.provenance import Link, Provenance
+from parcontact.files.hdf5 import Link, Provenance
 from parcontact.parallel.slab import Slab
 from parcontact.physics.records import Entry
 from parcontact.results import info

@@ -11,8 +11,7 @@ from mpi4py import MPI
 from parcontact.errors import InputError, RunError
 from parcontact.files import fields, hdf5
 from parcontact.files.fields import FieldsFile
-from parcontact.files.hdf5 import Slice
-from parcontact.files.provenance import Link, Provenance, extend_chain, read_chain
+from parcontact.files.hdf5 import Link, Provenance, Slice, extend_chain, read_chain
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import info
 

@@ -14,8 +14,8 @@ from parcontact.errors import InputError, InUseError
 from parcontact.files import directory, files, outputs, tables, wisdom
 from parcontact.files.checkpoint import TableMark
 from parcontact.files.directory import Directory
+from parcontact.files.hdf5 import Link, Provenance
 from parcontact.files.outputs import Claim
-from parcontact.files.provenance import Link, Provenance
 from parcontact.files.recorder import MeasuresFile, Recorder, Recording, StepRow, cut_back_table
 from parcontact.files.tables import GrowingTable, lacking_points, of_table, read_results, requested_points
 from parcontact.job import load

@@ -15,7 +15,7 @@ from drawing import ELASTIC, SLIDE, SPHERE, WAVE, ZENER, ran
 from parcontact import job
 from parcontact.effects.adhesion.results import Columns, PullOff, describe_pull_off, find
 from parcontact.errors import InputError
-from parcontact.files.provenance import cite_lines
+from parcontact.files.hdf5 import cite_lines
 from parcontact.job import Stage
 from parcontact.results import info, page
 

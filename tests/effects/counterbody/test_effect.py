@@ -14,7 +14,7 @@ from marched_jobs import column, marched
 from parcontact.effects.branches import relaxation_of
 from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
 from parcontact.errors import InputError, JobError
-from parcontact.files.provenance import references_of
+from parcontact.files.hdf5 import references_of
 from parcontact.job import Job, load
 from parcontact.job.listing import plain_data, plain_job
 from parcontact.job.schema import json_schema
