@@ -33,7 +33,7 @@ from scipy.optimize import brentq
 from ..columns import STUDY, names_of
 from ..errors import BAD_INPUT, FAILED, STOPPED_EARLY, InputError
 from ..files import files, outputs, run, sweep, tables
-from ..files.directory import Directory
+from ..files.outputs import Directory
 from ..files.stopping import Options
 from ..job import AUTO, Case, GeometricStep, Job, Stage
 from ..job.advice import one_cell

@@ -34,9 +34,9 @@ from ..physics.records import Certificate, Measures
 from ..printed import printable
 from . import fields, files, hdf5, outputs
 from .checkpoint import Contents, TableMark
-from .directory import Directory
 from .fields import FieldsFile
 from .hdf5 import PROGRAM, Provenance
+from .outputs import Directory
 from .tables import MEND, GrowingTable, whole_lines
 
 

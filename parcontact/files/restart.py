@@ -18,8 +18,7 @@ from ..parallel.slab import Slab
 from ..physics.records import part_of
 from . import checkpoint, outputs
 from .checkpoint import Contents
-from .directory import ADVICE, Directory
-from .outputs import Claim
+from .outputs import ADVICE, Claim, Directory
 
 SAME_STEP = 1e-9  # rounding: relative difference below which steps of two histories are the same
 

@@ -26,8 +26,7 @@ from ..printed import Bar
 from ..results import slide
 from ..results.results import Results
 from . import files, hdf5, outputs, recorder
-from .directory import ADVICE, Directory
-from .outputs import Claim
+from .outputs import ADVICE, Claim, Directory
 from .recorder import HEAD, Console, StepRow, machine_lines, step_line
 from .stopping import Options, watching
 

@@ -27,9 +27,8 @@ from ..results import slide
 from ..results.results import Results
 from . import checkpoint, hdf5, outputs, recorder, restart, tables, wisdom
 from .checkpoint import Contents, Facts
-from .directory import Directory
 from .hdf5 import Link, Provenance, cite_lines, extend_chain
-from .outputs import Claim
+from .outputs import Claim, Directory
 from .recorder import Recorder, Recording, machine_lines
 from .restart import RestartPoint
 from .stopping import Options, Watch, watching

@@ -17,7 +17,7 @@ from ..errors import Doubt
 from ..job import Checkpoint
 from ..parallel.root import Signals
 from ..parallel.slab import Slab
-from .directory import Directory
+from .outputs import Directory
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..printed import name_cases, per_cent
 from ..results import sweep_table
 from ..results.results import Results
 from . import files, outputs, stopping
-from .directory import refuse_files, refuse_other_jobs
+from .outputs import refuse_files, refuse_other_jobs
 from .stopping import StopFile
 
 ELSEWHERE = -1  # in place of an exit code: another program runs the case

@@ -14,9 +14,9 @@ from .. import printed
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..errors import DONE, FAILED, STOPPED_EARLY, Doubt, InputError, Kind, RunError, UnsolvedError
 from ..files import files, hdf5, outputs, tables, wisdom
-from ..files.directory import ADVICE, Directory
 from ..files.fields import SteadyMaps
 from ..files.hdf5 import Link, Provenance, cite_lines
+from ..files.outputs import ADVICE, Directory
 from ..files.recorder import Console
 from ..files.stopping import Options, Watch, always, watching
 from ..files.tables import GrowingTable, LostPoint, Wanted

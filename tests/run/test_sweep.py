@@ -21,7 +21,7 @@ from sweeping import JOB, table
 from parcontact.__main__ import main
 from parcontact.door import memory
 from parcontact.errors import InputError, RunError
-from parcontact.files import directory, files, stopping, sweep, tables
+from parcontact.files import files, outputs, stopping, sweep, tables
 from parcontact.files.stopping import StopFile
 from parcontact.job import Case, Job, load_cases
 from parcontact.march.sanity import WARN_CELLS, WARN_EDGE
@@ -377,7 +377,7 @@ def test_a_case_that_another_program_runs(
 ) -> None:
     """It is passed over, and has not failed; if it is the only one, the command is refused like a single run's."""
     cases, _ = cases_in_groups(tmp_path, monkeypatch)
-    monkeypatch.setattr(directory, "MAX_SECONDS_TO_RELEASE", 0.1)
+    monkeypatch.setattr(outputs, "MAX_SECONDS_TO_RELEASE", 0.1)
     where = cases[1].job.output.directory
     where.mkdir(parents=True)
     with (where / ".lock").open("w") as lock:

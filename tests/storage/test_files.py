@@ -11,11 +11,10 @@ import pytest
 
 from parcontact.columns import MEASURES, choose_columns
 from parcontact.errors import InputError, InUseError
-from parcontact.files import directory, files, outputs, tables, wisdom
+from parcontact.files import files, outputs, tables, wisdom
 from parcontact.files.checkpoint import TableMark
-from parcontact.files.directory import Directory
 from parcontact.files.hdf5 import Link, Provenance
-from parcontact.files.outputs import Claim
+from parcontact.files.outputs import Claim, Directory
 from parcontact.files.recorder import MeasuresFile, Recorder, Recording, StepRow, cut_back_table
 from parcontact.files.tables import GrowingTable, lacking_points, of_table, read_results, requested_points
 from parcontact.job import load
@@ -104,7 +103,7 @@ def job(tmp_path: Path) -> Path:
 
 def test_second_run_is_refused(tmp_path: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It writes nothing, and may have the directory as soon as the first has ended."""
-    monkeypatch.setattr(directory, "MAX_SECONDS_TO_RELEASE", 0.1)
+    monkeypatch.setattr(outputs, "MAX_SECONDS_TO_RELEASE", 0.1)
     first, second = directory_at(tmp_path / "out"), directory_at(tmp_path / "out")
     with first.claimed():
         with pytest.raises(InUseError, match=rf"in use by another run \(process {os.getpid()} on "), second.claimed():
