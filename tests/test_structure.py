@@ -70,8 +70,7 @@ FILES = {
     "__init__": "capabilities",
     "results": "results",
     "pictures": "results",
-    "steady": "steady",
-    "bands": "bands",
+    "steady": "bands",
 }  # that any capability may have, and who asks them
 
 

@@ -13,9 +13,8 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
 from parcontact.bands.road_history import plan_bands
-from parcontact.effects.heat.bands import flash_of_bands
 from parcontact.effects.heat.solver import Flash
-from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
+from parcontact.effects.heat.steady import describe_hot, describe_unmeasured, flash_of_bands
 from parcontact.job.meaning import excited_band
 from parcontact.parallel.slab import Slab
 from parcontact.results import band_charts, page

@@ -1,29 +1,54 @@
-"""Temperatures of steady sliding: the map below the contact, and with feedback one temperature at which all rubber
-relaxes.
+"""Temperatures of steady sliding, on one grid and in bands.
 
-The map is exact for the given heat (`effects.heat.solver`). With feedback all rubber relaxes as at one temperature T.
-The heat of this steady state causes the flash temperature T_0 + F(T), where T_0 is the temperature of the cold body.
-Secants within a bracket find the T for which `T = T_0 + F(T)`. Each round of this search is a steady state.
+On one grid the map below the contact is exact for the given heat (`effects.heat.solver`). With feedback all rubber
+relaxes as at one temperature T. The heat of this steady state causes the flash temperature T_0 + F(T), where T_0 is the
+temperature of the cold body. Secants within a bracket find the T for which `T = T_0 + F(T)`. Each round of this search
+is a steady state.
+
+In bands, the rise in each band is caused by its own heat and by the heat of all other bands. The heat of a band is
+released at the depths where its waves strain the rubber, and is distributed over the contact in proportion to the
+pressure. The temperature is a sum of waves cos(m z) along the depth. Such a wave has the share g_i(m) in the heat of
+band i, and the share g_k(m) in the mean temperature of the rubber that dissipates in band k. With the heat h_i [W/m^2]
+of band i, the rise of band k is
+
+    T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, j <= k) S_j(m)) dm.
+
+Here S belongs to uniform heat after the sliding time t,
+
+    S(m) = (1 - exp(-m^2 D t))/(kappa m^2),
+
+and S_j to the waves in the pressure of band j, which have the power P(q) relative to the square of the mean pressure:
+
+    S_j(m) = sum_q P(q) Re (1 - exp(-(beta^2 + m^2) D t))/(beta^2 + m^2)/kappa.
+
+Bands are numbered from the coarsest. Waves of band j modulate both the heat of band i and the temperature of band k
+only if i and k are as fine as j or finer. Heat of the interface is released on the surface, where g = 1, and counts as
+heat of the finest band.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ...contact.problem import Box, Mask
+from ...bands.band import Means
+from ...bands.cascade import Results, by_load, by_square
+from ...bands.choice import Cut
+from ...bands.road_sliding import RoadSliding
+from ...contact.problem import Box, Contact, Mask
 from ...errors import Doubt, InputError, Kind, UnsolvedError
 from ...job import Job, Zener
 from ...march.scene import Setup
 from ...march.steady import Point
 from ...parallel.slab import Array
+from ...physics.convolution import travelling_wavenumbers, wavenumbers
 from ...physics.records import Measures
 from ..branches import highest_temperature_of, temperature_of
 from .effect import Thermal, feeds_back
-from .solver import Flash, depths_of, flash_of, share_of, sliding_heat, sliding_heat_unbounded, spread_over
+from .solver import Conductor, Flash, depths_of, flash_of, share_of, sliding_heat, sliding_heat_unbounded, spread_over
 
 MOST_ROUNDS = 10  # tuning: limit on the rounds of the fixed point
 LEAST_ERROR = 0.02  # accuracy: least error of the flash temperature [K]
@@ -229,3 +254,212 @@ def doubts_of_points(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
     """Yield warnings about the temperatures of a friction curve."""
     yield from describe_hot(points)
     yield from describe_unmeasured(points, job)
+
+
+# -- bands -------------------------------------------------------------------------------------------------------------
+
+
+LEAST_BAND_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
+TINY = 1e-300  # rounding: least square of a change, to avoid division by 0
+SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits of m over wavenumbers of bands
+
+
+def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
+    """Return wavenumbers m [1/m] along the depth for bands between the wavenumbers `low` and `high` [1/m], and the
+    weights of these m in `2/pi int ... dm`; both have the shape (m,)."""
+    ends = np.log(LOWEST * low), np.log(HIGHEST * high)
+    m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
+    step = float(np.log(m[1] / m[0]))
+    weights = 2.0 / np.pi * step * m
+    weights[0] /= 1.0 - np.exp(-step)  # includes all waves below
+    return m, weights
+
+
+def uniform(body: Conductor, m: Array, time: float) -> Array:
+    """Return the uniform part S(m) [K m^3/W] of the rise after a sliding time [s], shape (m,)."""
+    return np.asarray(-np.expm1(-(m**2) * body.diffusivity * time) / m**2 / body.conductivity)
+
+
+@dataclass(frozen=True)
+class Warming:
+    """The factors of S_j(m) for all waves of band j, each multiplied by the number of waves that it stands for in a
+    half spectrum; shape (m, waves)."""
+
+    symbols: Array
+
+    def apply(self, setup: Setup, pressure: Array) -> Array:
+        """Return S_j(m), shape (m,), for a map of the pressure of band j."""
+        spectrum, total = setup.fft.forward(pressure), float(pressure.sum())
+        return np.asarray(self.symbols @ ((spectrum.real**2 + spectrum.imag**2) / total**2).ravel())
+
+
+def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Warming:
+    """Return the factors of S_j(m) for a band that has slid at `velocity` [m/s] for a `time` [s]."""
+    fft, size = setup.fft, setup.grid.size
+    q = np.hypot(*wavenumbers(fft, size))
+    along_x, along_y = travelling_wavenumbers(fft, size)
+    square = (q**2 - 1j * (along_x * velocity[0] + along_y * velocity[1]) / body.diffusivity).ravel()
+    counts = (fft.multiplicity * np.where(q > 0.0, 1.0, 0.0)).ravel()
+    reach, found = body.diffusivity * time, np.empty((m.size, square.size))
+    for row, one in zip(found, m, strict=True):
+        whole = np.where(counts > 0.0, square, 1.0) + one**2
+        row[:] = counts * np.real(-np.expm1(-whole * reach) / whole) / body.conductivity
+    return Warming(found)
+
+
+def shares_of_depth(setup: Setup, pressure: Array, velocity: Vector, m: Array) -> Array:
+    """Return the shares g(m) of waves along the depth in the heat of a band, under this map of pressure, shape (m,)."""
+    depths = depths_of(
+        setup.fft.forward(pressure), setup.fft, setup.half_space, setup.units.length, velocity, setup.prony
+    )
+    return depths.cosines(m) if depths.wavenumbers.size else np.ones_like(m)
+
+
+def rises_of(
+    weights: Array,
+    uniform: Array,
+    shares: Sequence[Array],
+    warmings: Sequence[Array],
+    heats: Sequence[float],
+    rubbed: float,
+) -> list[float]:
+    """Return the temperature rise [K] of each band, from the coarsest.
+
+    `weights` are the weights of the waves m in the integral, and `uniform` is S(m), both of shape (m,). `shares`,
+    `warmings` and `heats` have one item per band: g(m) and S_j(m), of shape (m,), and the heat [W/m^2]. `rubbed`
+    [W/m^2] is the heat of the interface.
+    """
+    sums = uniform + np.cumsum(warmings, axis=0)  # S and all S_j down to a band
+    sources = [*zip(shares, heats, strict=True), (np.ones_like(weights), rubbed)]
+    return [
+        float(sum(heat * np.sum(weights * own * felt * sums[min(i, k)]) for i, (own, heat) in enumerate(sources)))
+        for k, felt in enumerate(shares)
+    ]
+
+
+def flash_of_bands(
+    rises: Sequence[float], heats: Sequence[float], rounds: int = 1, friction_cold: float = math.nan
+) -> Flash:
+    """Return the temperatures of a contact from the `rises` [K] of its bands: the mean and the quartiles, weighted by
+    `heats`, and the highest rise of a band. The result also stores the number of `rounds` in which the rises were
+    found, and the friction of cold rubber, `friction_cold`."""
+    order = np.argsort(rises)
+    values, weights = np.asarray(rises)[order], np.asarray(heats)[order]
+    whole = float(weights.sum())
+    if not whole > 0.0:
+        return Flash(rounds=rounds, friction_cold=friction_cold)
+    shares = (np.cumsum(weights) - 0.5 * weights) / whole
+    lower, upper = np.interp([0.25, 0.75], shares, values)
+    hottest = float(values[-1])
+    return Flash(float(values @ weights) / whole, hottest, float(lower), float(upper), hottest, rounds, friction_cold)
+
+
+def seconds_of(job: Job, cut: Cut, velocity: Vector) -> float:
+    """Return the time [s] in which the rubber slides over `thermal.distance`, or, without this key, over the length of
+    the coarsest band's box."""
+    return float((job.section("thermal").distance or cut.box) / (math.hypot(*velocity) or math.inf))
+
+
+class HeatProbe:
+    """Measures S_j(m) and g(m) in the contacts of a band."""
+
+    means: ClassVar[Means] = {"depths": by_load, "warming": by_square}
+
+    def __init__(self, job: Job, cut: Cut) -> None:
+        self._job, self._cut, self._velocity = job, cut, (math.nan, math.nan)
+        self._waves, _ = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))
+
+    def slide(self, setup: Setup, velocity: Vector) -> None:
+        """Prepare the measurement of S_j(m) for a velocity [m/s]."""
+        if velocity != self._velocity:
+            body, seconds = self._job.section("thermal").conductor, seconds_of(self._job, self._cut, velocity)
+            self._warming, self._velocity = warming_of(setup, body, seconds, velocity, self._waves), velocity
+
+    def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
+        """Return g(m) as `depths` and S_j(m) as `warming` of a contact, both of shape (m,)."""
+        depths = shares_of_depth(setup, contact.p, velocity, self._waves)
+        return {"depths": depths, "warming": self._warming.apply(setup, contact.p)}
+
+
+def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
+    """Yield the probe that measures g(m) and S_j(m) of bands, if the job has a `thermal` section."""
+    if job.section("thermal") is not None:
+        yield HeatProbe(job, cut)
+
+
+class HeatOfBands:
+    """The loop that finds the temperatures of bands.
+
+    With feedback each band relaxes at its own temperature. The temperatures change the friction of bands, whose heat
+    gives new temperatures: Aitken's relaxation finds the temperatures that do not change any more. The first round is
+    for cold rubber. No temperature above the range of the material's shift is tried.
+    """
+
+    words: ClassVar[tuple[str, str]] = ("temperatures", "feedback: none")
+
+    def __init__(self, job: Job, cut: Cut) -> None:
+        self.moves, self._job, self._cut = feeds_back(job), job, cut
+        self._highest = highest_temperature_of(job.material) if self.moves else math.inf
+        self._rises, self._rounds, self._cold = np.zeros(cut.count), 1, math.nan
+
+    def begin(self, road: RoadSliding) -> None:
+        self._rises, self._rounds, self._cold = np.zeros(self._cut.count), 0, math.nan
+        self._over, self._last, self._relax = np.zeros(0), np.zeros(0), 1.0
+
+    def act(self, road: RoadSliding) -> None:
+        try:
+            road.set_temperatures(np.minimum(road.own_temperature + self._rises, self._highest).tolist())
+        except InputError as error:
+            raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
+
+    def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
+        """Return True if the bands have the rises that their heat causes, within an error. The rises stay 0 until all
+        loops before this one have settled for cold rubber. Arguments are as in
+        `bands.road_sliding.BandLoop.settles`."""
+        rubbed = road.rub(results) * road.speed
+        self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises
+        if math.isnan(self._cold):
+            self._over = self._over if others else 0.0 * self._over
+            self._cold = sum(result.friction for result in results) if others else math.nan
+        self._rounds += 1
+        self._settled = np.abs(self._over) <= np.maximum(LEAST_BAND_ERROR, RELATIVE * self._rises)
+        return bool(np.all(self._settled))
+
+    def move(self, road: RoadSliding, results: Results) -> None:
+        """Set the temperature rises of the next round. Raises RunError if the rises cannot settle below the end of the
+        shift's range."""
+        over, last, most = self._over, self._last, self._highest - road.own_temperature
+        at_most = (self._rises == most) & (over > 0.0)
+        if not np.all(self._settled) and np.all(self._settled | at_most):
+            place = road.speed, road.place[1], road.own_temperature
+            raise beyond_shift(*place, most, most + float(over[self._rises == most].max()))
+        if last.any():
+            change = over - last
+            square = max(float(change @ change), TINY)
+            self._relax = float(np.clip(-self._relax * float(last @ change) / square, 0.1, 1.0))
+        self._rises, self._last = np.clip(self._rises + self._relax * over, 0.0, most), over
+
+    def found(self, road: RoadSliding, point: Point, results: Results, changes: tuple[float, float]) -> Point:
+        """Return the point with the temperatures of its contact added."""
+        heats = [result.friction for result in results]
+        heats[-1] += point.measures.friction_interface
+        self._of_bands = self._rises_of(road, results, road.rub(results) * road.speed)
+        return point.with_effect("thermal", flash_of_bands(self._of_bands, heats, self._rounds, self._cold))
+
+    def values(self, results: Results) -> Mapping[str, Sequence[float]]:
+        return {"flash_temperature": self._of_bands}
+
+    def _rises_of(self, road: RoadSliding, results: Results, rubbed: float) -> list[float]:
+        """Return the rises [K] of all bands; `rubbed` is the heat of the interface [W/m^2]."""
+        velocity, pressure = road.place
+        m, weights = waves_along_depth(float(self._cut.edges[0]), float(self._cut.edges[-1]))
+        whole = uniform(self._job.section("thermal").conductor, m, seconds_of(self._job, self._cut, velocity))
+        shares, warmings = ([result.found[name] for result in results] for name in HeatProbe.means)
+        heats = [result.friction * pressure * road.speed for result in results]
+        return rises_of(weights, whole, shares, warmings, heats, rubbed)
+
+
+def band_loops(job: Job, cut: Cut) -> Iterator[HeatOfBands]:
+    """Yield the loop that finds the temperatures of bands, if the job has a `thermal` section."""
+    if job.section("thermal") is not None:
+        yield HeatOfBands(job, cut)

@@ -11,9 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.special import lambertw
 
 from parcontact import job as jobs
-from parcontact.effects.heat.bands import rises_of
 from parcontact.effects.heat.solver import Flash
-from parcontact.effects.heat.steady import Feedback
+from parcontact.effects.heat.steady import Feedback, rises_of
 from parcontact.errors import InputError, JobError, RunError
 from parcontact.files.tables import read_columns
 from parcontact.march import scene
