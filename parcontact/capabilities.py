@@ -1,13 +1,13 @@
 """Capabilities: each folder of `effects/` adds one to the program, and a deleted folder removes it.
 
 The package of a folder may state `SECTION`, the section of a job that turns it on, `EFFECT`, the name of its class in
-`effect.py`, and columns of tables (`Column`, found by `stated`). Other rooms of the program call `offers` to find
-objects in the other modules of the folder, such as `results.py`, and so name no capability. `GIVES` and `USES` name
-quantities of a step that an effect computes for other effects, and that it needs from them: effects that give something
-act before those that use it. `MATERIAL = True` says that the section is a material, which may include a file, and
-`IN_SCENE = True` that all jobs of a directory must have the same section. A run cannot continue with other values of
-keys that change its completed steps. These are all keys of the section, or the keys that `CHANGES_STEPS` names.
-`STAGE_KEYS` are the keys that a section adds to stages.
+`effect.py`, columns of tables, and panels of columns (`Column` and `ColumnPanel`, found by `stated`). Other rooms of
+the program call `offers` to find objects in the other modules of the folder, such as `results.py`, and so name no
+capability. `GIVES` and `USES` name quantities of a step that an effect computes for other effects, and that it needs
+from them: effects that give something act before those that use it. `MATERIAL = True` says that the section is a
+material, which may include a file, and `IN_SCENE = True` that all jobs of a directory must have the same section. A run
+cannot continue with other values of keys that change its completed steps. These are all keys of the section, or the
+keys that `CHANGES_STEPS` names. `STAGE_KEYS` are the keys that a section adds to stages.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -42,6 +42,26 @@ class Column:
 
 
 Table = Sequence[Column]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The quantity of an axis and its SI unit."""
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ColumnPanel:
+    """A panel of columns of a table whose rows and horizontal axis are not chosen yet. `columns` has the name of each
+    column by the name of its line."""
+
+    key: str
+    y: Axis
+    columns: Mapping[str, str]
+
+
 COUNTED = "number of points in contact over the number of all points"  # meaning of `contact_area`
 
 

@@ -4,7 +4,7 @@ A picture is a list of panels. A panel contains lines with bars of their errors,
 axes, or a map. `draw` draws it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -18,6 +18,9 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator
 
 from .. import printed
+from ..capabilities import Axis as Axis
+from ..capabilities import ColumnPanel as ColumnPanel
+from ..capabilities import stated
 from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
@@ -56,28 +59,10 @@ def entry(name: str, look: dict[str, Any]) -> Line:
     return Line(name, np.zeros(0), np.zeros(0), look)
 
 
-@dataclass(frozen=True)
-class Axis:
-    """The quantity of an axis and its SI unit."""
-
-    name: str
-    unit: str = ""
-
-
-@dataclass(frozen=True)
-class ColumnPanel:
-    """A panel of columns of a table whose rows and horizontal axis are not chosen yet. `columns` has the name of each
-    column by the name of its line."""
-
-    key: str
-    y: Axis
-    columns: Mapping[str, str]
-
-
 def offered(name: str) -> list[ColumnPanel]:
-    """Return the panels of columns that effects offer in the constant `name` of their pictures: RUN_PANELS,
-    CURVE_PANELS, BAND_PANELS or SWEEP_PANELS."""
-    return [one for found in answers("pictures", name) for one in found]
+    """Return the panels of columns that effects have in a constant called `name`: RUN_PANELS, CURVE_PANELS, BAND_PANELS
+    or SWEEP_PANELS."""
+    return [one for found in (*stated(name), *answers("pictures", name)) for one in found]
 
 
 @dataclass(frozen=True)

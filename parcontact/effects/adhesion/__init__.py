@@ -1,7 +1,7 @@
 """Adhesion: surfaces that attract each other. This module states the columns of tables for jobs with
 adhesion."""
 
-from ...capabilities import Column, Table
+from ...capabilities import Axis, Column, ColumnPanel, Table
 
 SECTION, EFFECT = "adhesion", "AdhesionColumns"
 CHANGES_STEPS = ("adhesion.work", "adhesion.range", "adhesion.law")  # see `capabilities`
@@ -35,3 +35,4 @@ RESULTS: Table = (  # results of a sweep
     Column(*("pull_off_error", "N"), "error of `pull_off` by steps, solves and mesh", when="adhesion"),
     Column("pull_off_approach", "m", "approach at the last pull-off", when="adhesion"),
 )
+SWEEP_PANELS = (ColumnPanel("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),)

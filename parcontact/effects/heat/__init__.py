@@ -5,7 +5,7 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
 
-from ...capabilities import Column, Table
+from ...capabilities import Axis, Column, ColumnPanel, Table
 
 SECTION, EFFECT = "thermal", "ThermalColumns"
 USES = ("shear",)  # see `capabilities`
@@ -83,3 +83,8 @@ FIELDS: Table = (
     Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
 )
 FIELDS_NEED = {"temperature": "a thermal section"}  # what the maps need
+
+RISE, FLASH = Axis("temperature rise", "K"), "flash_temperature"
+RUN_PANELS = (ColumnPanel("temperature", RISE, {"flash": FLASH, "highest": "max_temperature"}),)
+CURVE_PANELS = (ColumnPanel("steady flash", Axis("flash temperature", "K"), {"": FLASH}),)
+BAND_PANELS = (ColumnPanel("bands heat", RISE, {"": FLASH}),)

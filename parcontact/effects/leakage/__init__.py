@@ -1,6 +1,6 @@
 """Leakage through the gap of a contact, and its columns in tables."""
 
-from ...capabilities import COUNTED, Column, Table
+from ...capabilities import COUNTED, Axis, Column, ColumnPanel, Table
 
 SECTION, EFFECT = "leakage", "LeakageColumns"
 STAGE_KEYS = ("fluid_pressures",)
@@ -78,3 +78,6 @@ LEAK: Table = (
     Column(*("mass_flow_total", "kg/s", "the same flow as a mass"), when="--load total"),
 )
 TABLES = {"leak.csv": LEAK}
+
+FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
+SWEEP_PANELS = (ColumnPanel("leakage", Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)

@@ -13,8 +13,9 @@ import numpy as np
 from ...columns import UNITS
 from ...parallel.slab import Array
 from ...results import style
-from ...results.panels import Axis, Colors, ColumnPanel, Line, Panel, picture
+from ...results.panels import Axis, Colors, Line, Panel, picture
 from ...results.plotted_run import Abscissa, PlottedRun
+from . import FLOWS
 from .flow import FloatMap, Flow
 
 CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
@@ -61,9 +62,7 @@ RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "r", "ms": 11, "mew
 SHARE = Axis("flow over its largest")
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
-FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
 KEYS = ("leakage", "leak")  # names of panels for --panels
-SWEEP_PANELS = (ColumnPanel("leakage", Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
 KINDS = ("flow", "constriction")  # kinds of columns per direction
 LONG = 100.0  # ratio of times above which their axis is logarithmic
 

@@ -1,6 +1,6 @@
 """Strain softening of filled rubber in steady sliding (the Payne effect), and its columns in tables."""
 
-from ...capabilities import Column, Table
+from ...capabilities import Axis, Column, ColumnPanel, Table
 
 SECTION = "softening"
 EFFECT = "SofteningEffect"
@@ -17,3 +17,4 @@ STEADY: Table = (
 BANDS: Table = (
     Column("strain_amplitude", "", "strain that softens the rubber of the band (with `softening`)", when="softening"),
 )
+BAND_PANELS = (ColumnPanel("bands strain", Axis("strain amplitude"), {"": "strain_amplitude"}),)

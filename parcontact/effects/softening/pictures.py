@@ -1,4 +1,4 @@
-"""Panels of softening: strain by band, and factors of the moduli against strain, with strains of a curve."""
+"""Pictures of softening: factors of the moduli against strain, with strains of a curve."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -7,9 +7,8 @@ import numpy as np
 
 from ...parallel.slab import Array
 from ...results import style
-from ...results.panels import Axis, ColumnPanel, Line, Panel
+from ...results.panels import Axis, Line, Panel
 
-BAND_PANELS = (ColumnPanel("bands strain", Axis("strain amplitude"), {"": "strain_amplitude"}),)
 POINTS = 200  # number of points of a line
 NAMES = ("G' storage", "G'' loss")
 
