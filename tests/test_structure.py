@@ -49,7 +49,7 @@ STANDS_ON = {  # modules that stand on another floor than their room
     **_on("paths", "job.history", "job.map_files", "job.measured_maps"),
     **_on("accuracy", "march.time_error", "march.budget", "march.controller"),
     **_on("steady", "march.steady", "march.curve"),
-    **_on("runs", "files.restart", "files.run", "files.sweep"),
+    **_on("runs", "files.run", "files.sweep"),
     **_on("runs", "files.road_run"),
     **_on(
         "report",

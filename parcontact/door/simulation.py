@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from ..columns import cells
 from ..effects.effect import columns_of
 from ..errors import Doubt, InputError
-from ..files import checkpoint, recorder, restart, run, wisdom
+from ..files import checkpoint, recorder, run, wisdom
 from ..files.checkpoint import Contents, Facts, TableMark
 from ..files.fields import UNITS
 from ..files.stopping import Options
@@ -289,7 +289,7 @@ class Simulation:
         slab = simulation._slab
         plain = on_root(world, lambda: plain_job(job))
         with python_words():
-            found = restart.sound(file, job, plain, slab)
+            found = run.sound_checkpoint(file, job, plain, slab)
             if isinstance(found, str):
                 raise InputError(found)
         simulation._saved, simulation._began = found, True

@@ -16,7 +16,7 @@ from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Benc
 
 from parcontact.__main__ import main
 from parcontact.errors import InputError
-from parcontact.files import checkpoint, restart, tables
+from parcontact.files import checkpoint, run, tables
 from parcontact.files.hdf5 import read_budget
 from parcontact.files.run import chosen_by_accuracy
 from parcontact.job import Job
@@ -245,7 +245,7 @@ def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: 
 def test_a_changed_step_of_the_same_history(stopped: tuple[Bench, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps may differ although no key of the history does: no empty list of keys is shown."""
     bench, out = stopped
-    monkeypatch.setattr(restart, "find_changed_step", lambda contents, job: "step 1 differs")
+    monkeypatch.setattr(run, "find_changed_step", lambda contents, job: "step 1 differs")
     with pytest.raises(InputError, match="step 1 differs; to change what follows"):
         bench.run(bench.job("viscoelastic"), out)
 
