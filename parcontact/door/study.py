@@ -42,7 +42,7 @@ from ..job.reading import CASES
 from ..parallel.root import on_root
 from ..parallel.slab import Groups, Slab
 from ..printed import per_cent, with_error
-from ..results import compound_files, sweep_table
+from ..results import compound_files
 from ..results.results import Results
 from .memory import warm_up
 
@@ -446,7 +446,7 @@ def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: 
     errors = {case: estimate_errors(row, reference) for case, row in rows.items()}
     named = {case: {f"error_{name}": error for name, error in found.items()} for case, found in errors.items()}
     table = [{**row, **named[case], **cases[case].settings, "case": cases[case].number} for case, row in rows.items()]
-    sweep_table.save_cases(place / "study.csv", names_of(STUDY), table)
+    sweep.save_cases(place / "study.csv", names_of(STUDY), table)
     lines = [*describe_choices(job), *map(str, limits(refined, rows))]
     lines += sentences(rows, reference, ranks)
     files.replace_file(place / outputs.STUDY_TEXT, "\n".join(lines) + "\n")

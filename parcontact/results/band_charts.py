@@ -30,9 +30,8 @@ from ..parallel.slab import Array
 from . import style
 from .panels import Axis, ColumnPanel, Line, Panel, entry, offered
 from .plotted_run import FRACTION, PlottedRun, count_different, round_digits, to_contact_area, to_load
-from .results import PLACES, Results, read_cases, swept_keys
+from .results import PLACES, SAMPLES, Results, read_cases, swept_keys
 from .slide import CORRECTED
-from .sweep_table import SAMPLES
 
 NEEDED_OF_BANDS = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
 SHOWN = 4  # number of velocities that are drawn as lines

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 JOBS = [each.resolved for each in outputs.BY_VERB.values() if each.copies]
 PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
+SAMPLES = "seed", "centre"  # last words of keys that choose samples of one surface, over which means are taken
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *ERRORS, "residual")
 NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}  # columns of numbers in tables of a sweep

@@ -27,7 +27,7 @@ from parcontact.job import Case, Job, load_cases
 from parcontact.march.sanity import WARN_CELLS, WARN_EDGE
 from parcontact.parallel.root import Signals
 from parcontact.parallel.slab import Groups, Slab
-from parcontact.results import info, slide, sweep_table
+from parcontact.results import info, slide
 
 LEAVING = """
 grid: {points: 32, size: 1.0e-3, boundary: free}
@@ -237,7 +237,7 @@ def test_groups_of_ranks_take_cases_by_turns(
 
 
 def test_unfinished_cases_are_dealt_first(cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep_table, "state", lambda case: "done" if case.number in (0, 3) else "begun")
+    monkeypatch.setattr(sweep, "state_of", lambda case: "done" if case.number in (0, 3) else "begun")
     assert sweep.unfinished_first(cases) == [1, 2, 4, 5, 0, 3]
     assert sweep.to_do(cases, afresh=False) == [cases[number].job for number in (1, 2, 4, 5)]
     assert len(sweep.to_do(cases, afresh=True)) == 6
@@ -396,10 +396,10 @@ def test_tables_are_written_by_one_program_at_a_time(tmp_path: Path, monkeypatch
     """Jobs of an array end together: the last one to write has read what all others left."""
     cases, _ = cases_in_groups(tmp_path, monkeypatch)
     out = Path("out/job")
-    sweep_table.write_sweep_tables(out, cases)
+    sweep.write_sweep_tables(out, cases)
     with (out / ".sweep.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        other = threading.Thread(target=sweep_table.write_sweep_tables, args=(out, cases))
+        other = threading.Thread(target=sweep.write_sweep_tables, args=(out, cases))
         other.start()
         other.join(0.2)
         assert other.is_alive()

@@ -16,11 +16,12 @@ from matplotlib.figure import Figure
 
 from parcontact import __main__
 from parcontact.contact.splitting import SteadySolver
+from parcontact.files import sweep
 from parcontact.files.fields import SteadyMaps
 from parcontact.files.tables import read_columns
 from parcontact.march.mesh import load_cases
 from parcontact.march.steady import SteadySliding
-from parcontact.results import page, sweep_table
+from parcontact.results import page
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
 
@@ -141,7 +142,7 @@ def test_curve_of_a_sweep_has_only_begun_while_points_lack(
         return solve(self, velocity, pressure)
 
     def states(*overrides: str) -> list[str]:
-        return [sweep_table.state(case) for case in load_cases("job.yaml", overrides)]
+        return [sweep.state_of(case) for case in load_cases("job.yaml", overrides)]
 
     with monkeypatch.context() as patch:
         patch.setattr(SteadySliding, "solve", interrupted)

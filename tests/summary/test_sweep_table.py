@@ -10,7 +10,7 @@ from sweeping import JOB, table
 from parcontact.__main__ import main
 from parcontact.files import sweep, tables
 from parcontact.job import Case, load_cases
-from parcontact.results import band_charts, results, sweep_table
+from parcontact.results import band_charts, results
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def test_before_a_slide_no_error_of_friction_is_stated(cases: tuple[Case, ...]) 
     directory.mkdir(parents=True)
     head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,contact_area_corrected"
     (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,,0.1\n1,1,0,0.1,0.2,1e-5,0.25,3e-3,0.15\n")
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     row = table()[0]
     assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "", ""]
     assert (row["state"], row["seconds"], row["mu_max"]) == ("begun", "0.75", "")
@@ -50,7 +50,7 @@ def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
         for step, ((time, distance), (friction, area)) in enumerate(zip(instants, errors, strict=True))
     ]
     (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
-    sweep_table.write_sweep_tables(Path("out/job"), (changed,))
+    sweep.write_sweep_tables(Path("out/job"), (changed,))
     found = [float(table()[0][name]) for name in ("error_friction", "error_area")]
     assert found == pytest.approx([(0.1 * 0.02 + 0.3 * 0.01) / 0.4, 0.035], rel=1e-9)
 
@@ -66,7 +66,7 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
         rows = f"0.1,{1e4 * (1 + case.number * 1e-15)!r},{friction},0.5\n1.0,1e4,{friction / 2},0.25\n"
         text = "velocity,pressure,friction,contact_area_corrected\n" + rows
         (case.job.output.directory / "steady.csv").write_text(text)
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     points, means = table("sweep_curves.csv"), table("sweep_curves_mean.csv")
     assert [(row["surface.seed"], row["velocity"], row["friction"]) for row in points[2:4]] == [
         ("2", "0.1", "0.2"),
@@ -106,7 +106,7 @@ def test_a_damaged_table_concerns_its_case_alone(
     for case, lines in zip(cases, (text, sound), strict=True):
         case.job.output.directory.mkdir(parents=True)
         (case.job.output.directory / "steady.csv").write_text(lines)
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     assert [row["state"] for row in table()] == [state, "done"]
     assert {row["case"] for row in table("sweep_curves.csv")} == ({"0", "1"} if state == "done" else {"1"})
     assert len(sweep.to_do(cases, afresh=False)) == (state != "done")
@@ -118,7 +118,7 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
         head = f"step,time,distance,friction,{name},residual,seconds"
         rows = "0,0,0,0,0,0,0\n1,1,0,0.1,0.2,2e-5,0.5\n"
         (case.job.output.directory / "measures.csv").write_text(f"{head}\n{rows}")
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     assert [(row["state"], row["contact_area"]) for row in table()[:2]] == [("begun", "0.2"), ("damaged", "")]
 
 
@@ -134,7 +134,7 @@ def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeyp
         rows = [f"{v},{p},{case.number + p / 1e5 + v},0.5" for p in (1e4, 2e4) for v in (0.1, 1.0)]
         text = "\n".join(["velocity,pressure,friction,contact_area", *rows, ""])
         (case.job.output.directory / "steady.csv").write_text(text)
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     series = band_charts.panels_of_sweep(Path("out/job"))[0].series
     dashes = {one.name: one.look["linestyle"] for one in series if one.name.startswith("modulus inf")}
     colors = {one.name: one.look["color"] for one in series if one.name.endswith("kPa") and one.name not in dashes}
@@ -161,7 +161,7 @@ def test_errors_of_the_highest_and_the_mean_friction(cases: tuple[Case, ...]) ->
     rows = [(0, 0.0, 0.0, 0.0, ""), (1, 0.25, 0.25, 0.3, "0.1"), (2, 1.0, 1.0, 0.2, "0.3")]
     lines = [f"{k},{t * slide.seconds},{x * way},{mu},0.2,1e-5,1.0,{error},0.1" for k, t, x, mu, error in rows]
     (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
-    sweep_table.write_sweep_tables(Path("out/job"), (changed,))
+    sweep.write_sweep_tables(Path("out/job"), (changed,))
     row = table()[0]
     found = [float(row[name]) for name in ("mu_max", "mu_max_error", "mu_dyn", "mu_dyn_error")]
     assert found == pytest.approx([0.3, 0.03, 0.25, (0.03 + 0.06) / 2], rel=1e-9)
@@ -173,7 +173,7 @@ def test_sweep_table_has_theory_of_all_cases(cases: tuple[Case, ...]) -> None:
         directory.mkdir(parents=True)
         text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e5,0.0,0.1\n0.001,0.0,1e5,0.0,0.2\n"
         (directory / "theory.csv").write_text(f"{text}0.051,0.0005,1e5,0.02,0.3\n")
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
+    sweep.write_sweep_tables(Path("out/job"), cases)
     assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
     assert [row["mu_max"] for row in table()] == [""] * 6
 
