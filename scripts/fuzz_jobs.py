@@ -49,7 +49,7 @@ from robustness import any_job
 
 from parcontact import ParcontactWarning, Simulation, __main__, job
 from parcontact.bands.choice import cut_bands
-from parcontact.effects.adhesion.section import chosen_range
+from parcontact.effects.adhesion.effect import chosen_range
 from parcontact.errors import InputError, RunError
 from parcontact.job import limits, yaml_text
 from parcontact.march import mesh

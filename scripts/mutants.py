@@ -33,7 +33,6 @@ OTHERS = {  # further tests of a part
     "march/loop.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/state.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py physics/test_material.py",
-    "effects/adhesion/section.py": "effects/adhesion/test_effect.py",
     "effects/adhesion/adhesive_law.py": "effects/adhesion/test_gap_solver.py",
     **dict.fromkeys(("contact/problem.py", "contact/kernels.py"), "solve/test_contact.py solve/test_kernels.py"),
     "contact/certificate.py": "solve/test_iterate.py",

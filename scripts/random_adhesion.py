@@ -25,7 +25,7 @@ import numpy as np
 import runs
 from numpy.typing import NDArray
 
-from parcontact.effects.adhesion.section import law_of
+from parcontact.effects.adhesion.effect import law_of
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March

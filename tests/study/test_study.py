@@ -29,7 +29,7 @@ from parcontact.door.study import (
     make_cases,
     overrides,
 )
-from parcontact.effects.adhesion.section import law_of
+from parcontact.effects.adhesion.effect import law_of
 from parcontact.errors import InputError
 from parcontact.files import run as runner
 from parcontact.files.stopping import Options

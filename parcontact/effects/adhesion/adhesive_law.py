@@ -44,7 +44,6 @@ from .gap_solver import (
     Law,
     surface_energy,
 )
-from .section import law_of
 
 MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
@@ -284,11 +283,12 @@ class _Walk(NamedTuple):
 
 
 class AdhesiveLaw:
-    """Contact law of a run whose job has the section `adhesion` (`effects.effect.ContactLaw`)."""
+    """Contact law of a run whose job has the section `adhesion` (`effects.effect.ContactLaw`). `attraction` is the law
+    of attraction of the job, an `effect.AdhesionLaw`."""
 
     may_shorten = True
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: Any, attraction: Any) -> None:
         setup, numerics = scene.setup, scene.choices.numerics
         by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
         gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
@@ -296,7 +296,7 @@ class AdhesiveLaw:
         self.solver = AdhesiveSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
         self.scene, self.slab, self.grid = scene, setup.slab, scene.choices.grid
         self._goes_on_open = scene.job.section("adhesion").detached == "open"
-        self._attraction = law_of(scene.job)
+        self._attraction = attraction
 
     def law(self, alpha: float) -> Law:
         """Return the law of attraction for a step with the modulus alpha: in the run's units, with its strength divided

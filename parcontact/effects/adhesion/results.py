@@ -28,7 +28,7 @@ from ...march.budget import PULL_OFF
 from ...march.time_error import Fit
 from ...printed import quantity
 from ...results.results import Results
-from .section import law_of
+from .effect import law_of
 
 ZONE = Fit(
     "pull-off: times a power of the cell over the process zone",

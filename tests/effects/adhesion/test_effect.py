@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, advance_energies
-from parcontact.effects.adhesion.section import law_of
+from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, advance_energies, law_of
 from parcontact.effects.effect import SolvedContact
 from parcontact.errors import InputError
 from parcontact.job import Job
