@@ -27,9 +27,9 @@ import yaml
 
 from ..columns import TABLES, describe_columns
 from ..errors import InputError
-from ..job import schema
+from ..job import model
+from ..job.model import Key, SectionSchema
 from ..job.parts import kind_key
-from ..job.schema import Key, SectionSchema
 
 ROOM = 64  # letters for the first sentence of a docstring in the list of names
 BLOCK = re.compile(r"^```\{eval-rst\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -96,7 +96,7 @@ def meanings() -> dict[str, dict[str, Any]]:
 
 def keys() -> str:
     """Return all sections of a job and their keys, as Markdown."""
-    return "\n".join(line for section in schema.sections() for line in _section(section))
+    return "\n".join(line for section in model.sections() for line in _section(section))
 
 
 def heading(section: SectionSchema) -> str:

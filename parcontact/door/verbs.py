@@ -509,13 +509,12 @@ def schema(options: argparse.Namespace) -> int:
     import json
     import sys
 
-    from ..job import listing
-    from ..job import schema as job_schema
+    from ..job import listing, model
 
-    unknown = (f"{listing.describe_effect(name)} {reason}" for name, reason in job_schema.without_schema().items())
+    unknown = (f"{listing.describe_effect(name)} {reason}" for name, reason in model.without_schema().items())
     for text in (*listing.unusable(), *unknown):
         print(f"warning: {text}; the schema does not include it", file=sys.stderr)
-    print(json.dumps(job_schema.json_schema(), indent=1))
+    print(json.dumps(model.json_schema(), indent=1))
     return DONE
 
 

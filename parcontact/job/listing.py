@@ -253,6 +253,11 @@ def own_sections() -> list[str]:
     return sorted(_folders())
 
 
+def materials() -> list[str]:
+    """Return the names of all sections that have the keys of a material: `material`, and those of effects."""
+    return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
+
+
 @cache
 def _load(section: str) -> Any:
     return _registered()[section].load()

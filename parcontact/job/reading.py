@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from .. import capabilities
 from ..errors import Doubt, InputError, JobError, SweepWarnings
 from . import yaml_text
+from .listing import materials
 from .model import NO_GRID, Job
 from .parts import Included, Origin, log_range
 from .yaml_text import (
@@ -255,11 +255,6 @@ def _dead_end(node: Any, shown: str, name: str) -> str:
 
 
 # -- materials from other files ---------------------------------------------------------------------------------------
-
-
-def materials() -> list[str]:
-    """Return the names of all sections that have the keys of a material: `material`, and those of effects."""
-    return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
 
 
 def _material(source: Source, section: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import yaml
 from marched_jobs import ROOT
 
 from parcontact import __main__
-from parcontact.job import schema, yaml_text
+from parcontact.job import model, yaml_text
 
 from . import texts
 from .texts import SMALL
@@ -174,7 +174,7 @@ WRONG = {
 
 @pytest.fixture(scope="module")
 def validator() -> jsonschema.Draft202012Validator:
-    found = schema.json_schema()
+    found = model.json_schema()
     jsonschema.Draft202012Validator.check_schema(found)
     return jsonschema.Draft202012Validator(found)
 
@@ -208,12 +208,12 @@ def test_a_job_needs_its_sections(validator: jsonschema.Draft202012Validator) ->
 
 def test_every_key_is_in_it(validator: jsonschema.Draft202012Validator) -> None:
     text = json.dumps(validator.schema)
-    assert not [key.word for section in schema.sections() for key in section.keys if f'"{key.word}":' not in text]
+    assert not [key.word for section in model.sections() for key in section.keys if f'"{key.word}":' not in text]
 
 
 def test_nothing_is_left_open(validator: jsonschema.Draft202012Validator) -> None:
     """A type for which there is no schema would allow anything; only a material next to an include has some."""
-    found = schema.json_schema()
+    found = model.json_schema()
     empty = [path for path, value in walk(found) if value == {} or value == {"description": value_of(value)}]
     assert not empty
 
@@ -230,5 +230,5 @@ def walk(node: Any, path: str = "") -> Any:
 
 def test_the_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(schema.json_schema()))
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(model.json_schema()))
     assert yaml.safe_load(RIGHT)

@@ -26,7 +26,7 @@ from parcontact import __main__
 from parcontact.columns import TABLES
 from parcontact.door import manual_texts
 from parcontact.door.arguments import parse_arguments
-from parcontact.job import schema, yaml_text
+from parcontact.job import model, yaml_text
 from parcontact.march import mesh
 
 PAGES = manual_texts.page_names()
@@ -108,11 +108,11 @@ def test_the_page_on_python_is_text() -> None:
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
     written = {part: set(known) for part, known in manual_texts.meanings().items()}
-    assert written == {section.part.__name__: {key.word for key in section.keys} for section in schema.sections()}
+    assert written == {section.part.__name__: {key.word for key in section.keys} for section in model.sections()}
 
 
 def examples() -> Iterator[Any]:
-    for section in schema.sections():
+    for section in model.sections():
         for key in section.keys:
             yield pytest.param(section.part, key.word, id=f"{section.part.__name__}.{key.word}")
 

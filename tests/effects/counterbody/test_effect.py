@@ -17,7 +17,7 @@ from parcontact.errors import InputError, JobError
 from parcontact.files.hdf5 import references_of
 from parcontact.job import Job, load
 from parcontact.job.listing import plain_data, plain_job
-from parcontact.job.schema import json_schema
+from parcontact.job.model import json_schema
 from parcontact.march import choices, mesh, scene
 from parcontact.march.curve import request
 from parcontact.march.steady import SteadySliding
