@@ -35,9 +35,8 @@ from ..job.history import Timeline
 from ..march import curve, mesh, sanity
 from ..march.scene import set_up
 from ..march.steady import Point
-from ..parallel.mpi import MPI
 from ..parallel.root import on_root, wait_for_all
-from ..parallel.slab import Slab
+from ..parallel.slab import MPI, Slab
 from ..physics import prony
 from ..results.results import Results
 

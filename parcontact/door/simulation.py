@@ -28,9 +28,8 @@ from ..march import sanity, steady
 from ..march.choices import choices
 from ..march.loop import March
 from ..march.sanity import ContactWatch
-from ..parallel.mpi import MPI
 from ..parallel.root import on_root, wait_for_all
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import MPI, Array, Slab
 from .python import Given, agree, all_ranks, path_of, python_words, read_job_here, warn
 
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from ..errors import Doubt
     from ..files.stopping import Options
     from ..job import Case, Job
-    from ..parallel.mpi import MPI
-    from ..parallel.slab import Slab
+    from ..parallel.slab import MPI, Slab
 
     Verb = Callable[[argparse.Namespace], int]
     Shows = Callable[[Doubt], bool]  # whether a warning is shown
@@ -68,7 +67,7 @@ def started() -> MPI.Intracomm | None:
 def start_ranks() -> MPI.Intracomm:
     """Start MPI, and return the communicator of all ranks. Raises InputError if the launcher belongs to another MPI."""
     _refuse_surroundings()
-    from ..parallel.mpi import MPI
+    from ..parallel.slab import MPI
 
     world, count = MPI.COMM_WORLD, launched()
     if world.size == 1 and count > 1:

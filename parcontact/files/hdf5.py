@@ -23,8 +23,7 @@ from numpy.typing import DTypeLike, NDArray
 from .. import __version__
 from ..errors import InputError, RunError
 from ..parallel import root
-from ..parallel.mpi import MPI
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import MPI, Array, Slab
 from ..text_tables import OWN_FORMATS
 from .files import reason, without_mark
 

@@ -28,8 +28,7 @@ from ..capabilities import Column
 from ..columns import MEASURES, cells, choose_columns, names_of, values_of
 from ..errors import InputError, RunError
 from ..march.budget import ErrorBudget
-from ..parallel.mpi import MPI
-from ..parallel.slab import Array
+from ..parallel.slab import MPI, Array
 from ..physics.records import Certificate, Measures
 from ..printed import printable
 from . import fields, files, hdf5, outputs

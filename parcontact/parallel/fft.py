@@ -47,8 +47,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
-from .mpi import MPI
-from .slab import Array, Slab, allocate, deal, dealt_to, reused, without_memory
+from .slab import MPI, Array, Slab, allocate, deal, dealt_to, reused, without_memory
 
 INTERFACES = "pyfftw.interfaces"
 SEPARATOR = b"\x1e"  # separates the wisdom of each precision

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import loop
-from .mpi import MPI
-from .slab import Array, Slab
+from .slab import MPI, Array, Slab
 
 Index = slice | NDArray[np.intp]
 

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..errors import RunError
 
 if TYPE_CHECKING:
-    from .mpi import MPI
+    from .slab import MPI
 
 T = TypeVar("T")
 
@@ -158,7 +158,7 @@ def _ranks_of(found: list[str]) -> str:
 
 def _leave() -> None:
     """Answer the other ranks at the end of the program, until all have ended."""
-    from .mpi import MPI
+    from .slab import MPI
 
     error = getattr(sys, "last_value", None)  # an uncaught exception
     what = ENDED + (f" with {type(error).__name__}: {str(error)[:200]}" if error is not None else "")

