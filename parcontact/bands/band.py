@@ -132,7 +132,7 @@ Means = Mapping[str, Callable[[Any], Array]]  # weights of rungs in the mean of 
 class Probe(Protocol):
     """Part of an effect that measures arrays in each contact of a band. All methods are local.
 
-    The function `probes(job, cut)` in the module `bands` of an effect yields its probes for the bands `cut` of a job.
+    The function `probes(job, cut)` in the module `steady` of an effect yields its probes for the bands `cut` of a job.
     """
 
     means: ClassVar[Means]

@@ -325,9 +325,12 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
     ]
 
 
-def on_one_grid_of_all(job: Job, cut: Cut) -> Job:
-    """Return the job with one grid that resolves the waves of all bands. The grid is for the range of frequencies that
-    the waves excite, and not for a solve."""
+def on_one_grid_of_all(job: Job, cut: Cut | None = None) -> Job:
+    """Return a job in bands with one grid that resolves the waves of all bands, and any other job as it is. The grid is
+    for the range of frequencies that the waves excite, and not for a solve. `cut` are the bands if they are known."""
+    if job.bands is None:
+        return job
+    cut = cut or cut_bands(job)
     side = cut.wavelengths(0)[0]
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     return job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})

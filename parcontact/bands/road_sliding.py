@@ -80,8 +80,8 @@ class BandOutcome:
 class BandLoop(Protocol):
     """Loop of rounds by which an effect changes bands and finds its results. Its methods are collective.
 
-    The function `loops(job, cut)` in the module `bands` of an effect yields its loops. Loops that change the bands
-    have `moves` = True and share the rounds of one fixed point.
+    The function `band_loops(job, cut)` in the module `steady` of an effect yields its loops. Loops that change the
+    bands have `moves` = True and share the rounds of one fixed point.
     """
 
     moves: bool  # False if the effect only finds something in a state

@@ -331,9 +331,9 @@ def _on_one_grid(job: Job) -> Job:
     """Return a job in bands as a job with one grid for all its waves."""
     if job.bands is None:
         return job
-    from ..bands.choice import cut_bands, on_one_grid_of_all
+    from ..bands.choice import on_one_grid_of_all
 
-    return on_one_grid_of_all(job, cut_bands(job))
+    return on_one_grid_of_all(job)
 
 
 @root_alone

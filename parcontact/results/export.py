@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bands.choice import cut_bands, on_one_grid_of_all
+from ..bands.choice import on_one_grid_of_all
 from ..columns import to_csv
 from ..errors import Doubt, InputError
 from ..files import files, tables
@@ -84,7 +84,7 @@ def _outside(directory: Path, points: Sequence[Wanted]) -> dict[Wanted, Doubt]:
     path, found = Results(directory, "steady").job_file, dict[Wanted, Doubt]()
     try:
         job = load(path) if path else None
-        job = on_one_grid_of_all(job, cut_bands(job)) if job and job.bands is not None else job
+        job = on_one_grid_of_all(job) if job else None
     except InputError:  # its files no longer exist
         return found
     if job is None or job.steady is None:

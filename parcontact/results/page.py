@@ -219,9 +219,8 @@ CAPTION = "{} over frequency, at the temperature of the job"
 
 def material_section(job: Job) -> ReportSection:
     """Return the section on the material of a job at its temperature."""
-    if job.bands is not None:
-        with suppress(InputError):  # its files no longer exist
-            job = on_one_grid_of_all(job, cut_bands(job))
+    with suppress(InputError):  # its files no longer exist
+        job = on_one_grid_of_all(job)
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [

@@ -184,7 +184,7 @@ def scales_table(curve: Results) -> list[ReportTable]:
     with suppress(InputError):
         job = load(path)
         rows = [*_lengths(job)]
-        whole = on_one_grid_of_all(job, cut_bands(job)) if job.bands is not None else job
+        whole = on_one_grid_of_all(job)
         for one in excited_bands(whole, (job.steady.temperatures if job.steady else None) or ()):
             body = whole if one.temperature is None else whole.at_temperature(one.temperature)
             at = "" if one.temperature is None else f" at {one.temperature:g} °C"

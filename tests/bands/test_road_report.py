@@ -53,14 +53,12 @@ def test_frequencies_are_of_all_waves(tmp_path: Path) -> None:
     """From the slowest over the longest wave, the map, to the fastest over the shortest one of the spectrum."""
     table = spectrum(tmp_path / "s.csv", LONG, LONG / 40)
     alone = jobs.load(job_of([{"shape": "rough", "spectrum": table, "seed": 1}]))
-    low, high = excited_band(on_one_grid_of_all(alone, cut_bands(alone))) or (0.0, 0.0)
+    low, high = excited_band(on_one_grid_of_all(alone)) or (0.0, 0.0)
     assert low == pytest.approx(0.01 / LONG, rel=1e-3)
     assert high == pytest.approx(1.0 / (LONG / 40), rel=0.02)  # whole cells
     first = road_map(tmp_path / "road.npy", 128, 4 * LONG)
     mapped = jobs.load(job_of([first, {"shape": "rough", "spectrum": table, "seed": 1}]))
-    assert (excited_band(on_one_grid_of_all(mapped, cut_bands(mapped))) or (0.0,))[0] == pytest.approx(
-        0.01 / (4 * LONG)
-    )
+    assert (excited_band(on_one_grid_of_all(mapped)) or (0.0,))[0] == pytest.approx(0.01 / (4 * LONG))
 
 
 def test_check_knows_all_temperatures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
