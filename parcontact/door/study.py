@@ -17,7 +17,8 @@ with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. 
 differs from h2/h1). The uncertainty is the larger of two changes of the limit: if the order changes by DOUBT,
 and with four sizes, if the finest one is left out. It is at least LEAST_DOUBT of the last difference.
 
-Results of a study are limits, errors of all cases, the best settings, and sentences about them.
+Results of a study are limits, errors of all cases, the best settings, and sentences about them. A picture shows the
+errors against the refinement of mesh and time step (as Fig. 6 of the paper), and against the computing time.
 """
 
 import itertools
@@ -40,9 +41,10 @@ from ..job.advice import one_cell
 from ..job.listing import plain_job
 from ..job.reading import CASES
 from ..parallel.root import on_root
-from ..parallel.slab import Groups, Slab
+from ..parallel.slab import Array, Groups, Slab
 from ..printed import per_cent, with_error
-from ..results import compound_files
+from ..results import style
+from ..results.panels import Axis, Line, Panel, Shade, picture
 from ..results.results import Results
 from .memory import warm_up
 
@@ -451,7 +453,7 @@ def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: 
     lines += sentences(rows, reference, ranks)
     files.replace_file(place / outputs.STUDY_TEXT, "\n".join(lines) + "\n")
     doubts = {name: limit.doubt for name, limit in reference.items()}
-    compound_files.plot_study(place, _curves(refined, rows, errors), doubts)
+    plot_study(place, _curves(refined, rows, errors), doubts)
     return lines
 
 
@@ -465,10 +467,89 @@ def _mean_areas(directory: Path) -> dict[str, float]:
     return found
 
 
-def _curves(refined: Ladders, rows: Outcomes, errors: Errors) -> list[compound_files.StudyCurve]:
+# -- the picture -------------------------------------------------------------------------------------------------------
+
+NAMES = {"mu_max": "largest friction", "mu_dyn": "dynamic friction", "contact_area_corrected": "contact area"}
+MARKS = {  # mark and dashes of a ladder
+    TOGETHER: ("o", "-"),
+    CHOSEN: ("D", "-"),
+    "mesh alone": ("s", "--"),
+    TIME: ("^", ":"),
+}
+COLORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
+GREY = 5.0  # ratio of the edges of the grey band
+LEAST_ERROR = 1e-7  # smallest error on the axis; smaller ones are drawn there
+
+
+@dataclass(frozen=True)
+class StudyCurve:
+    """Errors of one quantity along a `ladder`, a list of more and more refined settings. `sizes` are the sizes of their
+    cells or steps relative to the box, `seconds` the wall times of all their steps."""
+
+    quantity: str
+    integrator: str
+    ladder: str
+    sizes: Sequence[float]
+    errors: Sequence[float]
+    seconds: Sequence[float]
+
+    def over(self, x: Array) -> Line:
+        """Return the line of the errors [%] against the values x."""
+        mark, dashes = MARKS[self.ladder]
+        look = {"color": COLORS[self.integrator], "marker": mark, "linestyle": dashes}
+        return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)
+
+
+def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
+    """Draw `convergence.png` of a study and return its path; None if nothing is refined.
+
+    `doubts` has the relative uncertainty of the reference of each quantity. A grey band of the panel shows the errors
+    below it.
+    """
+    drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
+    if not drawn:
+        return None
+    own: dict[str, list[StudyCurve]] = {}
+    for curve in drawn:
+        own.setdefault(curve.quantity, []).append(curve)
+    panels = [panel for name, found in own.items() for panel in _errors(name, found, doubts[name])]
+    with style.drawing():
+        return style.save_figure(picture("", [panels]), directory / outputs.STUDY_PICTURE)
+
+
+def _errors(name: str, curves: Sequence[StudyCurve], doubt: float) -> list[Panel]:
+    """Return the panels of errors of a quantity over the refinement of mesh or step with respect to the coarsest, and
+    over time, on axes of at least a decade; grey up to the uncertainty `doubt` of the reference."""
+    errors = _per_cent([error for curve in curves for error in curve.errors if math.isfinite(error)])
+    low, high = _widened(errors)
+    y, shades = Axis(f"{NAMES[name]}:\nerror [%]"), list[Shade]()
+    if 0.0 < doubt < math.inf:
+        low, high = min(max(low, 100 * doubt / GREY), 100 * doubt), max(high, 200 * doubt)
+        shades.append(Shade("", low, 100 * doubt, "y"))
+    finer = Axis("refinement, coarsest = 1"), [max(one.sizes) / np.asarray(one.sizes) for one in curves]
+    times = Axis("time of all steps", "s"), [np.asarray(one.seconds, float) for one in curves]
+    panels, logarithmic = [], Panel(name, Axis(""), y, shades=shades, log_x=True, log_y=True, y_range=(low, high))
+    for x, places in (finer, times):
+        lines = [one.over(at) for one, at in zip(curves, places, strict=True)]
+        panels.append(replace(logarithmic, x=x, series=lines, x_range=_widened(np.concatenate(places))))
+    return panels
+
+
+def _widened(values: Array) -> tuple[float, float]:
+    """Return limits of a logarithmic axis around values, at least a decade apart, so that there are ticks."""
+    low, high = float(values.min()), float(values.max())
+    middle, half = math.sqrt(low * high), max((high / low) ** 0.55, math.sqrt(10.0))
+    return middle / half, middle * half
+
+
+def _per_cent(errors: Sequence[float]) -> Array:
+    return 100 * np.maximum(errors, LEAST_ERROR)
+
+
+def _curves(refined: Ladders, rows: Outcomes, errors: Errors) -> list[StudyCurve]:
     """Return the errors along each ladder."""
     return [
-        compound_files.StudyCurve(
+        StudyCurve(
             *(quantity, integrator, name, sizes),
             [errors[case][quantity] for case in cases],
             [rows[case]["seconds"] for case in cases],

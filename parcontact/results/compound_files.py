@@ -1,21 +1,17 @@
-"""Two pictures of fits and studies, and the files of fitted materials.
+"""Files of fitted materials, which are sections that jobs include, and their pictures.
 
-A file of a fitted material is a section that jobs include. Its picture shows the moduli at the reference temperature
-with the fit, residuals, branches and shift factors.
-
-The picture of a study shows errors of results against the refinement of mesh and time step (as Fig. 6 of the paper),
-and against the computing time.
+A picture shows the moduli at the reference temperature with the fit, residuals, branches and shift factors.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..files import files, outputs
+from ..files import files
 from ..parallel.slab import Array
 from ..rubber.compound import TITLE, Compound
 from ..rubber.series import log_factors, reduce_sets
@@ -119,80 +115,3 @@ def _shift(compound: Compound) -> Iterator[Panel]:
     drawn = (np.linspace(min(temperatures), max(temperatures), POINTS), SOLID), (np.array(temperatures), DOTS)
     lines = [Line("", at, np.array([shift.log_factor(float(t)) for t in at]), look) for at, look in drawn]
     yield Panel("shift", Axis("temperature", "°C"), Axis("log10 of the shift factor"), lines, bottom=False)
-
-
-NAMES = {"mu_max": "largest friction", "mu_dyn": "dynamic friction", "contact_area_corrected": "contact area"}
-MARKS = {  # mark and dashes of a ladder
-    "mesh and time together": ("o", "-"),
-    "mesh with auto steps": ("D", "-"),
-    "mesh alone": ("s", "--"),
-    "time alone": ("^", ":"),
-}
-INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
-BAND = 5.0  # ratio of the edges of the grey band
-LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
-
-
-@dataclass(frozen=True)
-class StudyCurve:
-    """Errors of one quantity along a `ladder`, a list of more and more refined settings. `sizes` are the sizes of their
-    cells or steps relative to the box, `seconds` the wall times of all their steps."""
-
-    quantity: str
-    integrator: str
-    ladder: str
-    sizes: Sequence[float]
-    errors: Sequence[float]
-    seconds: Sequence[float]
-
-    def over(self, x: Array) -> Line:
-        """Return the line of the errors [%] against the values x."""
-        mark, dashes = MARKS[self.ladder]
-        look = {"color": INTEGRATORS[self.integrator], "marker": mark, "linestyle": dashes}
-        return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)
-
-
-def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
-    """Draw `convergence.png` of a study and return its path; None if nothing is refined.
-
-    `doubts` has the relative uncertainty of the reference of each quantity. A grey band of the panel shows the errors
-    below it.
-    """
-    drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
-    if not drawn:
-        return None
-    own: dict[str, list[StudyCurve]] = {}
-    for curve in drawn:
-        own.setdefault(curve.quantity, []).append(curve)
-    panels = [panel for name, found in own.items() for panel in _errors(name, found, doubts[name])]
-    with style.drawing():
-        return style.save_figure(picture("", [panels]), directory / outputs.STUDY_PICTURE)
-
-
-def _errors(name: str, curves: Sequence[StudyCurve], doubt: float) -> list[Panel]:
-    """Return the panels of errors of a quantity over the refinement of mesh or step with respect to the coarsest, and
-    over time, on axes of at least a decade; grey up to the uncertainty `doubt` of the reference."""
-    errors = _per_cent([error for curve in curves for error in curve.errors if math.isfinite(error)])
-    low, high = _widened(errors)
-    y, shades = Axis(f"{NAMES[name]}:\nerror [%]"), list[Shade]()
-    if 0.0 < doubt < math.inf:
-        low, high = min(max(low, 100 * doubt / BAND), 100 * doubt), max(high, 200 * doubt)
-        shades.append(Shade("", low, 100 * doubt, "y"))
-    finer = Axis("refinement, coarsest = 1"), [max(one.sizes) / np.asarray(one.sizes) for one in curves]
-    times = Axis("time of all steps", "s"), [np.asarray(one.seconds, float) for one in curves]
-    panels, logarithmic = [], Panel(name, Axis(""), y, shades=shades, log_x=True, log_y=True, y_range=(low, high))
-    for x, places in (finer, times):
-        lines = [one.over(at) for one, at in zip(curves, places, strict=True)]
-        panels.append(replace(logarithmic, x=x, series=lines, x_range=_widened(np.concatenate(places))))
-    return panels
-
-
-def _widened(values: Array) -> tuple[float, float]:
-    """Return limits of a logarithmic axis around values, at least a decade apart, so that there are ticks."""
-    low, high = float(values.min()), float(values.max())
-    middle, half = math.sqrt(low * high), max((high / low) ** 0.55, math.sqrt(10.0))
-    return middle / half, middle * half
-
-
-def _per_cent(errors: Sequence[float]) -> Array:
-    return 100 * np.maximum(errors, LEAST)

@@ -13,7 +13,8 @@ from drawing import SPHERE, STRIP, WAVE, ZENER, asked, ran
 
 from parcontact import job
 from parcontact.__main__ import main
-from parcontact.results import compound_files, page, plots, report_sections
+from parcontact.door import study
+from parcontact.results import page, plots, report_sections
 from parcontact.rubber import compound
 
 BANDS, VELOCITIES, TEMPERATURES, PRESSURES = 12, np.logspace(-3, 1, 9), (0.0, 20.0, 40.0), (1e5, 4e5)
@@ -252,14 +253,14 @@ def draw_sweep_of_numbers(path: Path) -> None:
 def draw_study(path: Path) -> None:
     """Draw the errors of all integrators along all ladders."""
     curves = [
-        compound_files.StudyCurve(
+        study.StudyCurve(
             *(name, integrator, ladder, [1.0, 0.5, 0.25, 0.125]),
             *(np.geomspace(0.1, 1e-4 * (k + 1), 4).tolist(), [0.3 * 8**n for n in range(4)]),
         )
-        for name in compound_files.NAMES
-        for k, (integrator, ladder) in enumerate(product(compound_files.INTEGRATORS, compound_files.MARKS))
+        for name in study.NAMES
+        for k, (integrator, ladder) in enumerate(product(study.COLORS, study.MARKS))
     ]
-    compound_files.plot_study(path, curves, dict.fromkeys(compound_files.NAMES, 1e-4))
+    study.plot_study(path, curves, dict.fromkeys(study.NAMES, 1e-4))
 
 
 def draw_compound(path: Path) -> None:
