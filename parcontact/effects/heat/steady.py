@@ -28,7 +28,7 @@ heat of the finest band.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -280,21 +280,9 @@ def uniform(body: Conductor, m: Array, time: float) -> Array:
     return np.asarray(-np.expm1(-(m**2) * body.diffusivity * time) / m**2 / body.conductivity)
 
 
-@dataclass(frozen=True)
-class Warming:
-    """The factors of S_j(m) for all waves of band j, each multiplied by the number of waves that it stands for in a
-    half spectrum; shape (m, waves)."""
-
-    symbols: Array
-
-    def apply(self, setup: Setup, pressure: Array) -> Array:
-        """Return S_j(m), shape (m,), for a map of the pressure of band j."""
-        spectrum, total = setup.fft.forward(pressure), float(pressure.sum())
-        return np.asarray(self.symbols @ ((spectrum.real**2 + spectrum.imag**2) / total**2).ravel())
-
-
-def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Warming:
-    """Return the factors of S_j(m) for a band that has slid at `velocity` [m/s] for a `time` [s]."""
+def warming_factors(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Array:
+    """Return the factors of S_j(m) for all waves of a band j that has slid at `velocity` [m/s] for a `time` [s], each
+    multiplied by the number of waves that it stands for in a half spectrum; shape (m, waves)."""
     fft, size = setup.fft, setup.grid.size
     q = np.hypot(*wavenumbers(fft, size))
     along_x, along_y = travelling_wavenumbers(fft, size)
@@ -304,15 +292,7 @@ def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: 
     for row, one in zip(found, m, strict=True):
         whole = np.where(counts > 0.0, square, 1.0) + one**2
         row[:] = counts * np.real(-np.expm1(-whole * reach) / whole) / body.conductivity
-    return Warming(found)
-
-
-def shares_of_depth(setup: Setup, pressure: Array, velocity: Vector, m: Array) -> Array:
-    """Return the shares g(m) of waves along the depth in the heat of a band, under this map of pressure, shape (m,)."""
-    depths = depths_of(
-        setup.fft.forward(pressure), setup.fft, setup.half_space, setup.units.length, velocity, setup.prony
-    )
-    return depths.cosines(m) if depths.wavenumbers.size else np.ones_like(m)
+    return found
 
 
 def rises_of(
@@ -373,12 +353,15 @@ class HeatProbe:
         """Prepare the measurement of S_j(m) for a velocity [m/s]."""
         if velocity != self._velocity:
             body, seconds = self._job.section("thermal").conductor, seconds_of(self._job, self._cut, velocity)
-            self._warming, self._velocity = warming_of(setup, body, seconds, velocity, self._waves), velocity
+            self._factors, self._velocity = warming_factors(setup, body, seconds, velocity, self._waves), velocity
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
         """Return g(m) as `depths` and S_j(m) as `warming` of a contact, both of shape (m,)."""
-        depths = shares_of_depth(setup, contact.p, velocity, self._waves)
-        return {"depths": depths, "warming": self._warming.apply(setup, contact.p)}
+        spectrum, m = setup.fft.forward(contact.p), self._waves
+        depths = depths_of(spectrum, setup.fft, setup.half_space, setup.units.length, velocity, setup.prony)
+        shares = depths.cosines(m) if depths.wavenumbers.size else np.ones_like(m)
+        power = (spectrum.real**2 + spectrum.imag**2) / float(contact.p.sum()) ** 2
+        return {"depths": shares, "warming": np.asarray(self._factors @ power.ravel())}
 
 
 def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
@@ -400,7 +383,6 @@ class HeatOfBands:
     def __init__(self, job: Job, cut: Cut) -> None:
         self.moves, self._job, self._cut = feeds_back(job), job, cut
         self._highest = highest_temperature_of(job.material) if self.moves else math.inf
-        self._rises, self._rounds, self._cold = np.zeros(cut.count), 1, math.nan
 
     def begin(self, road: RoadSliding) -> None:
         self._rises, self._rounds, self._cold = np.zeros(self._cut.count), 0, math.nan

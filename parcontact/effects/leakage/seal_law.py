@@ -77,12 +77,6 @@ def pressure_of(drop: PressureDrop, share: Map) -> Map:
     return np.sqrt(drop.low**2 + share * (drop.high**2 - drop.low**2)) - drop.outside
 
 
-def linear_share(shape: tuple[int, int]) -> Map:
-    """Return the share s of the pressure drop in a gap of constant height, a map of `shape` (ny, nx)."""
-    row = 1.0 - (np.arange(shape[1]) + 0.5) / shape[1]
-    return np.broadcast_to(row, shape).copy()
-
-
 def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
     """Return the map of gaps [m] through which as much fluid would flow without slip as flows through `gap` [m] with
     slip. `share` is the map of s, which gives the local pressure."""
@@ -114,6 +108,15 @@ def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Fil
     return Filled(share.T.copy(), mean * balance.power(share) * size[0] / size[1])
 
 
+class Verdict(NamedTuple):
+    """Verdict on a round: `settled` is True if the rounds have settled, and `lifted` is True if the fluid lifts the
+    seal off. `change` is the estimated relative error of the flow."""
+
+    settled: bool
+    lifted: bool
+    change: float
+
+
 class Rounds:
     """The rounds of one step for a pressure drop on a box of `size` (lx, ly) [m]. The object keeps the maps of earlier
     rounds, and lives on root only."""
@@ -125,13 +128,12 @@ class Rounds:
         self._parts, self._small = np.ones(()), SMALL
         self._last: tuple[Map, Map] | None = None
 
-    def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
+    def advance(self, gap: Map, share: Map, most: float) -> tuple[Verdict, Map]:
         """Make a round: find the flow through the map `gap` [m], which belongs to the contact under the fluid's
         pressure for the map `share` of s.
 
-        Return two items. The first one tells whether the rounds have settled, whether the fluid lifts the seal off, and
-        the estimated relative error of the flow. The second one is the map of s for the next round, whose mean pressure
-        is at most `most` [Pa].
+        Return the verdict on the round, and the map of s for the next round, whose mean pressure is at most `most`
+        [Pa].
         """
         if self.count and self.count % EACH == 0:
             self._restart()
@@ -147,7 +149,7 @@ class Rounds:
         settled = drop.high == drop.low or (rest * change < SETTLED and moved < SETTLED)
         self.error = rest * change
         if lifted or settled:
-            return (settled and not lifted, lifted, self.error), share
+            return Verdict(settled and not lifted, lifted, self.error), share
         by_cells = (self.count - 1) % EACH >= ANDERSON
         mixed = self._damped(share, filled.share, rest) if by_cells else self._mixed(share, filled.share)
         following = np.clip(mixed, 0.0, 1.0)
@@ -156,7 +158,7 @@ class Rounds:
             following = (
                 share + max(0.0, (most - mean) / (then - mean)) * (following - share) if mean < most else filled.share
             )
-        return (False, False, self.error), following
+        return Verdict(False, False, self.error), following
 
     def _restart(self) -> None:
         """Forget the rounds so far, and go on with a larger leak."""
@@ -258,15 +260,6 @@ class SealMemory:
     end: Detached | None = None
 
 
-class _Verdict(NamedTuple):
-    """Verdict on the last round: True in `settled` if the rounds have settled, True in `lifted` if the seal lifts off,
-    and in `change` the estimated relative error of the flow."""
-
-    settled: bool
-    lifted: bool
-    change: float
-
-
 class SealLaw:
     """Contact law of a scene with `leakage: {load: total}`; contacts are solved by the usual law of the scene."""
 
@@ -308,17 +301,18 @@ class SealLaw:
             self._fluid.fill(0.0)
             return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, None))
         sharp = min(self.scene.choices.numerics.tolerance, SHARP)
-        rounds, known, iterations, left = Rounds(drop, self._size), memory.modulus, 0, MOST_ROUNDS
-        while True:
+        rounds, known, iterations, most = Rounds(drop, self._size), memory.modulus, 0, math.inf
+        if isinstance(control, MeanPressure):  # mean pressure of the fluid at which contact still carries a load
+            most = (1.0 - LEAST_LOAD) * control.value * trial.alpha * self.scene.units.pressure
+        for _ in range(MOST_ROUNDS):
             load = self._press(trial, drop, share, control)
             pasts = PreviousContacts((PreviousPressure(self._start, known),), past.spare, past.approach)
             pressed = replace(trial, effective=self._heights)
             solved = self._dry.solve(pressed, step, load, None, pasts, before, sharp)
             contact, known, iterations = solved.contact, trial.alpha, iterations + solved.contact.iterations
             self._put_gap(self._heights, contact, gap)
-            verdict = self._advance(rounds, share, gap, self._most(trial, control))
-            left -= 1
-            if contact.failure or verdict.settled or verdict.lifted or not left:
+            verdict = self._advance(rounds, share, gap, most)
+            if contact.failure or verdict.settled or verdict.lifted:
                 break
             self._start[...] = contact.p
         contact.p[...] += self._fluid
@@ -335,10 +329,8 @@ class SealLaw:
         solver, goes into the map of starts, and its share into the spare map of the share. Both are moved with the
         surface by whole cells."""
         (share, _), last, start = memory.spare, past.last, self._start
-        if not memory.flows:
-            share[...] = linear_share(self.slab.shape)
-        else:
-            share[...] = memory.share
+        nx = self.slab.nx  # the share in a gap of constant height is linear
+        share[...] = memory.share if memory.flows else 1.0 - (np.arange(nx) + 0.5) / nx
         start.fill(0.0)
         if memory.modulus:
             unit = memory.modulus * self.scene.units.pressure
@@ -363,12 +355,6 @@ class SealLaw:
         mean = self.slab.sum(float(self._fluid.sum()))[0] / self.slab.points
         return MeanPressure(max(control.value - mean, LEAST_LOAD * control.value))
 
-    def _most(self, trial: Trial, control: Control) -> float:
-        """Return the largest mean pressure of the fluid [Pa] at which contact still carries a load."""
-        if not isinstance(control, MeanPressure):
-            return math.inf
-        return (1.0 - LEAST_LOAD) * control.value * trial.alpha * self.scene.units.pressure
-
     def _put_gap(self, heights: Array, contact: Contact, gap: Array) -> None:
         """Put the gap [m] of a contact into a map, 0 where the surfaces touch; local."""
         np.subtract(contact.u, heights, out=gap)
@@ -377,18 +363,18 @@ class SealLaw:
         np.maximum(gap, OPEN, out=gap)
         gap[contact.p > 0.0] = 0.0
 
-    def _advance(self, rounds: Rounds, share: Array, gap: Array, most: float) -> _Verdict:
+    def _advance(self, rounds: Rounds, share: Array, gap: Array, most: float) -> Verdict:
         """Solve for the flow in a gap, and put the share of the next round into a map unless the rounds end;
         collective."""
         whole, old = self.slab.to_root(gap), self.slab.to_root(share)
         found = list[Array]()
 
-        def act() -> _Verdict:
+        def act() -> Verdict:
             assert whole is not None
             assert old is not None
             verdict, then = rounds.advance(whole, old, most)
             found.append(then)
-            return _Verdict(*verdict)
+            return verdict
 
         verdict = on_root(self.slab.comm, act)
         if not (verdict.settled or verdict.lifted):
