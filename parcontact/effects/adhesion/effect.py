@@ -259,13 +259,6 @@ WARN_RANGE_BEYOND_HEIGHTS = Kind(
 )
 
 
-def doubt_range(job: Any, span: float) -> Iterator[Doubt]:
-    """Yield a warning if the range of attraction exceeds the height `span` of a rough surface, from its lowest to its
-    highest point [m]."""
-    if (reach := law_of(job).range) > span > 0.0:
-        yield WARN_RANGE_BEYOND_HEIGHTS("adhesion", {"range": reach, "span": span, "remedy": _shorten(job)})
-
-
 def _shorten(job: Any) -> str:
     """Return the advice to use a shorter range, which `auto` has on finer cells."""
     if job.adhesion.range == AUTO:
@@ -402,6 +395,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         SINGLE: "contacts with adhesion are solved in double precision",
         BY_THEORY: "the theory excludes adhesion: leave out the section adhesion",
     }
+    doubts = staticmethod(doubts_of_adhesion)
 
     @staticmethod
     def remembers(job: Any) -> bool:
@@ -420,7 +414,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
-        return doubt_range(job, span)
+        if (reach := law_of(job).range) > span > 0.0:
+            yield WARN_RANGE_BEYOND_HEIGHTS("adhesion", {"range": reach, "span": span, "remedy": _shorten(job)})
 
     @staticmethod
     def doubt_cases(jobs: Sequence[Any]) -> Iterator[Doubt]:
@@ -444,10 +439,6 @@ class AdhesionColumns(Effect[AdhesionMemory]):
             return Decision("adhesion", False, "there is no adhesion section")
         law = law_of(job)
         return Decision("adhesion", True, f"{law.work:g} J/m^2 over a range of {law.range:.4g} m ({law.kind})")
-
-    @staticmethod
-    def doubts(job: Any) -> Iterator[Doubt]:
-        return doubts_of_adhesion(job)
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:

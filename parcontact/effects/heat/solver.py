@@ -94,6 +94,13 @@ class Conductor:
         """The conductivity divided by the root of the diffusivity [W s^(1/2)/(m^2 K)]."""
         return float(self.conductivity / np.sqrt(self.diffusivity))
 
+    def squared_beta(self, fft: FFT, size: Vector, velocity: Vector, rows: slice = ALL) -> Spectrum:
+        """Return the square of beta of (1) [1/m^2] for `rows` of a spectrum, in a box of `size` [m] and for the
+        `velocity` [m/s] of the contact."""
+        square = np.hypot(*wavenumbers(fft, size, rows)) ** 2
+        along_x, along_y = travelling_wavenumbers(fft, size, rows)
+        return square - 1j * (along_x * velocity[0] + along_y * velocity[1]) / self.diffusivity
+
 
 @dataclass(frozen=True)
 class Depths:
@@ -161,28 +168,20 @@ def sliding_heat(
     reach = body.diffusivity * time
 
     def part(rows: slice) -> Spectrum:
-        beta = _beta(fft, size, body, velocity, rows)
+        beta = np.sqrt(body.squared_beta(fft, size, velocity, rows))  # the root with a positive real part
         mean = beta == 0.0
         beta[mean] = 1e-9 / max(size)
-        symbol = _on_surface(beta, reach) if depths is None else depths.warmed(beta, felt, reach)
+        if depths is None:
+            from scipy.special import erf
+
+            symbol = (erf(beta * np.sqrt(reach)) if reach < np.inf else 1.0) / beta
+        else:
+            symbol = depths.warmed(beta, felt, reach)
         if time == np.inf:
             symbol[mean] = 0.0
         return symbol / body.conductivity
 
     return Convolution(fft, part, fft.complex, even=not velocity[1])
-
-
-def _on_surface(beta: Spectrum, reach: float) -> Spectrum:
-    from scipy.special import erf
-
-    return (erf(beta * np.sqrt(reach)) if reach < np.inf else 1.0) / beta
-
-
-def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice = ALL) -> Spectrum:
-    """Return beta [1/m] for these rows of a spectrum, the root with a positive real part."""
-    square = np.hypot(*wavenumbers(fft, size, rows)) ** 2
-    along_x, along_y = travelling_wavenumbers(fft, size, rows)
-    return np.sqrt(square - 1j * (along_x * velocity[0] + along_y * velocity[1]) / body.diffusivity)
 
 
 def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, velocity: Vector, prony: Prony) -> Depths:
@@ -214,10 +213,7 @@ def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, veloci
     return Depths(found, powers[there] / powers.sum() if there.any() else powers[there])
 
 
-MEAN_TIMES, MEAN_ERROR = (
-    (1e-12, 1e12),
-    1e-9,
-)  # accuracy: times [s] and relative error of the sum for the mean of the box
+MEAN_TIMES, MEAN_ERROR = (1e-12, 1e12), 1e-9  # accuracy: times [s] and relative error of the mean of the box
 
 
 @dataclass(frozen=True)

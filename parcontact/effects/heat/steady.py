@@ -44,7 +44,6 @@ from ...job import Job, Zener
 from ...march.scene import Setup
 from ...march.steady import Point
 from ...parallel.slab import Array
-from ...physics.convolution import travelling_wavenumbers, wavenumbers
 from ...physics.records import Measures
 from ..branches import highest_temperature_of, temperature_of
 from .effect import Thermal, feeds_back
@@ -284,13 +283,11 @@ def warming_factors(setup: Setup, body: Conductor, time: float, velocity: Vector
     """Return the factors of S_j(m) for all waves of a band j that has slid at `velocity` [m/s] for a `time` [s], each
     multiplied by the number of waves that it stands for in a half spectrum; shape (m, waves)."""
     fft, size = setup.fft, setup.grid.size
-    q = np.hypot(*wavenumbers(fft, size))
-    along_x, along_y = travelling_wavenumbers(fft, size)
-    square = (q**2 - 1j * (along_x * velocity[0] + along_y * velocity[1]) / body.diffusivity).ravel()
-    counts = (fft.multiplicity * np.where(q > 0.0, 1.0, 0.0)).ravel()
+    square = body.squared_beta(fft, size, velocity)
+    counts = (fft.multiplicity * (square.real > 0.0)).ravel()
     reach, found = body.diffusivity * time, np.empty((m.size, square.size))
     for row, one in zip(found, m, strict=True):
-        whole = np.where(counts > 0.0, square, 1.0) + one**2
+        whole = np.where(counts > 0.0, square.ravel(), 1.0) + one**2
         row[:] = counts * np.real(-np.expm1(-whole * reach) / whole) / body.conductivity
     return found
 

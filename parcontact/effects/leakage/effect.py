@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -85,10 +86,9 @@ class SealStage(Stage):
     )
 
 
-def _only_total(load: str, **given: Any) -> Iterator[Fault]:
-    for key, value in given.items():
-        if value is not None and load == "net":
-            yield Fault("needs load: total; of a net load `parcontact leak --fluid --pressures` gives the flow", (key,))
+def _only_total(key: str, load: str, given: Any) -> Iterator[Fault]:
+    if given is not None and load == "net":
+        yield Fault("needs load: total; of a net load `parcontact leak --fluid --pressures` gives the flow", (key,))
 
 
 def _whole(load: str, every: int, pressures: Pair | None) -> Iterator[Fault]:
@@ -114,9 +114,7 @@ class Leakage(Part):
     load: Literal["net", "total"] = "net"
 
     rules = (
-        Rule(("load", "pressures"), lambda load, given: _only_total(load, pressures=given)),
-        Rule(("load", "ambient"), lambda load, given: _only_total(load, ambient=given)),
-        Rule(("load", "fluid"), lambda load, given: _only_total(load, fluid=given)),
+        *(Rule(("load", key), partial(_only_total, key)) for key in ("pressures", "ambient", "fluid")),
         *rules_of(_whole),
     )
 
@@ -243,17 +241,16 @@ class LeakageColumns(Effect[tuple[float, ...]]):
     stage: ClassVar[type[Stage]] = SealStage
     rules: ClassVar[tuple[Rule, ...]] = RULES
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["fluid_pressure"],)
-    brings_law: ClassVar[bool] = False  # a rule excludes steady sliding with `load: total`
 
     @staticmethod
     def decide(job: Any) -> Decision:
         section: Leakage | None = job.section("leakage")
-        why = (
-            "there is no leakage section" if section is None else f"the flow is calculated every {section.every} steps"
+        if section is None:
+            return Decision("leakage", False, "there is no leakage section")
+        carried = f"{section.substance.name} carries a part of the load"
+        return Decision(
+            "leakage", True, carried if section.total else f"the flow is calculated every {section.every} steps"
         )
-        if section is not None and section.total:
-            why = f"{section.substance.name} carries a part of the load"
-        return Decision("leakage", section is not None, why)
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> Mask | None:
@@ -313,7 +310,7 @@ class Seal(LeakageColumns):
 
     columns: ClassVar[tuple[str, ...]] = ("flow_x", "constriction", *added_by("leakage.load"))
     fields: ClassVar[tuple[str, ...]] = ("fluid_pressure",)
-    brings_law: ClassVar[bool] = False
+    brings_law: ClassVar[bool] = False  # a rule excludes steady sliding with `load: total`
 
     def __init__(self, scene: Any) -> None:
         self._scene = scene

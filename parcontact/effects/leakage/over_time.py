@@ -41,9 +41,7 @@ from . import LEAK, pictures, results
 from .flow import FloatMap, Flow, Leak, PressureDrop, flow_mesh_error, leak, least_section, solve_flow
 
 Array = NDArray[np.float64]
-LOADS = (
-    6  # accuracy: loads in the range of the integral; three leave errors of 1 to 20 % in a wavy channel, six below 1 %
-)
+LOADS = 6  # accuracy: loads in the integral; in a wavy channel three leave errors of 1 to 20 %, six less than 1 %
 POINTS = 2001  # accuracy: of the integral; errors of 1e-6
 SAME = 1e-3  # accuracy: relative difference below which loads count as the same
 RISE = 0.01  # accuracy: relative rise of K over the load above which K depends on more than the load
@@ -237,10 +235,8 @@ class Gaps:
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
         if not (directory / outputs.RUN.table).is_file():
-            what = (
-                "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
-            )
-            raise InputError(f"{directory} is no {what}")
+            sweep = "output directory of a run; those of a sweep are in its cases/"
+            raise InputError(f"{directory} is no {sweep if directory.is_dir() else 'directory'}")
         job = self.job = shown_job(directory / outputs.RUN.resolved)
         self.directory, self.results = directory, Results(directory, "run", job)
         self.size, self.periodic = job.grid.size, job.grid.cyclic

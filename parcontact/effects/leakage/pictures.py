@@ -50,11 +50,8 @@ def conductivity_panel(
         narrow = known & (flow > 0.0) & is_thin(constrictions[name])
         if narrow.any():
             thin.append(Line(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
-    looks = [style.line(number) | {"linestyle": ":"} for number in range(len(dotted))]
-    lines += [
-        Line(name, at[flow > 0.0], flow[flow > 0.0], look)
-        for (name, flow), look in zip(dotted.items(), looks, strict=True)
-    ]
+    for number, (name, flow) in enumerate(dotted.items()):
+        lines.append(Line(name, at[flow > 0.0], flow[flow > 0.0], style.line(number) | {"linestyle": ":"}))
     return Panel("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
 
 
@@ -95,9 +92,8 @@ def _leak_over_pressure(run: PlottedRun) -> Iterator[Panel]:
     lines = [Line("total load", high[flowing], columns["flow_rate"][flowing], style.line(0) | {"marker": "."})]
     net = np.flatnonzero(loaded & (columns["fluid_pressure"] == 0.0) & (high == low))
     if net.size:
-        drops = (
-            section.drop((float(one), float(other))) for one, other in zip(high[flowing], low[flowing], strict=True)
-        )
+        ends = zip(high[flowing].tolist(), low[flowing].tolist(), strict=True)
+        drops = (section.drop(each) for each in ends)
         alone = [drop.flow_rate(float(columns["flow_x"][net[0]]), *run.job.grid.size) for drop in drops]
         lines.append(Line("net load", high[flowing], np.array(alone), style.line(0) | {"linestyle": ":"}))
     axes = Axis("high pressure", "Pa"), Axis("leak", "m³/s")
@@ -113,15 +109,14 @@ def draw_leakage(
     instant: str,
     rows: Sequence[Any],
     over: str = "",
-) -> Path:
-    """Draw the flow along x and y on the map of the gap at an instant, and K of all instants. Return the path."""
-
+) -> None:
+    """Draw the flow along x and y on the map of the gap at an instant, and K of all instants, into the file `path`."""
     circled = ", constriction circled" * any(flow.percolates for flow in flows)
     title = f"flow through the gap, {instant}\ncontact black{circled}"
     curve = [panel_of(rows, over)] if any(row.constriction > 0.0 for row in rows[1:]) else []
     maps = [_flow_map(axis, size, gap, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
     with style.drawing():
-        return style.save_figure(picture(title, [maps, curve] if curve else [maps]), path)
+        style.save_figure(picture(title, [maps, curve] if curve else [maps]), path)
 
 
 def panel_of(rows: Sequence[Any], over: str) -> Panel:
@@ -150,19 +145,14 @@ def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, f
     """Return the panel of the flow through a gap, divided by its largest value, with a ring around the constriction."""
     ring, least, shown = list[Line](), 2.0, np.full_like(gap, np.nan)  # without a path no bar of colours
     if flow.position is not None:
-        ring.append(Line("", *_place(flow.position, size, gap.shape), RING))
+        cell = zip(flow.position[::-1], size, gap.shape[::-1], strict=True)
+        ring.append(Line("", *(np.array([(k + 0.5) * length / n]) for k, length, n in cell), RING))
         most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
         least, shown = 10.0**-DECADES, flux / most
     where = (0.0, size[0], 0.0, size[1])
     colors = Colors(shown, where, SHARE, least, 1.0, blank="k", log=True, behind=np.where(gap > 0.0, gap, np.nan))
     title = f"along {axis}" if flow.percolates else f"along {axis}: closed, no path"
     return Panel("flow", Axis("x", "m"), Axis("y", "m"), ring, title, colors=colors)
-
-
-def _place(cell: tuple[int, int], size: tuple[float, float], shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return the coordinates [m] of the middle of a cell in a row and a column."""
-    x, y = ((k + 0.5) * length / n for k, length, n in zip(cell[::-1], size, shape[::-1], strict=True))
-    return np.array([x]), np.array([y])
 
 
 def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:
