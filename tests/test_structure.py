@@ -52,14 +52,9 @@ STANDS_ON = {  # modules that stand on another floor than their room
     **_on("runs", "files.run", "files.sweep"),
     **_on("runs", "files.road_run"),
     **_on(
-        "report",
-        "results.page",
-        "results.export",
-        "results.report_sections",
-        "results.prediction",
-        "results.surface_summary",
+        "report", "results.page", "results.export", "results.report_sections", "results.prediction", "results.inputs"
     ),
-    **_on("verbs", "door.arguments", "door.map_jobs", "door.verbs"),
+    **_on("verbs", "door.arguments", "door.verbs"),
     **_on("physics", "effects.leakage.flow", "effects.heat.solver"),
     **_on("contact", "effects.stick.solver", "effects.adhesion.gap_solver"),
     **_on("report", "effects.leakage.over_time"),

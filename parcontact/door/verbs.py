@@ -341,17 +341,17 @@ def fit(options: argparse.Namespace) -> int:
     """Fit a material to measured moduli; write a material file and a picture."""
     from ..job.meaning import excited_band
     from ..march import mesh
-    from ..results import compound_files
+    from ..results import inputs
     from ..rubber import compound
     from ..rubber.shift import read_shift
 
     target = options.out or options.table.with_suffix(".yaml")
-    compound_files.refuse_foreign(target)
+    inputs.refuse_foreign(target)
     band = excited_band(_on_one_grid(mesh.load(options.job))) if options.job else None
     law = read_shift(options.shift, options.reference)
     of_fit = (options.error, options.weight, options.vertical)
     made = compound.fitted(options.table, options.poisson, options.reference, law, *of_fit)
-    for line in compound_files.write_compound(made, target, band):
+    for line in inputs.write_compound(made, target, band):
         print(line)
     return DONE
 
@@ -377,17 +377,16 @@ def surface(options: argparse.Namespace) -> int:
     from ..march import sanity
     from ..march.scene import set_up
     from ..parallel.slab import Slab
-    from ..results.surface_summary import describe_surface
-    from . import map_jobs
+    from ..results import inputs
 
     given = Path(options.job)
     picture, options.out = Path(options.out or f"{given.stem}-surface.png"), None
-    alone = map_jobs.is_map(given)
+    alone = inputs.is_map(given)
     if options.start and not alone:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
     if options.start and os.path.lexists(options.start):
         raise InputError(f"--job: {options.start} already exists; give another name")
-    job = map_jobs.load_map(given, options.set) if alone else _load(options)
+    job = inputs.load_map(given, options.set) if alone else _load(options)
     if job.bands is not None:
         raise InputError(f"{given} has bands, each with heights on a grid of its own: give it a grid instead (grid)")
     sanity.refuse_memory(job)
@@ -395,8 +394,8 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    lines = describe_surface(job, heights, base.remarks.notes, base.shortest, picture)
-    started = map_jobs.start_job(job, given, options.start) if alone else ()
+    lines = inputs.describe_surface(job, heights, base.remarks.notes, base.shortest, picture)
+    started = inputs.start_job(job, given, options.start) if alone else ()
     print("\n".join([*lines, *(f"warning: {doubt}" for doubt in doubts), *started]))
     return DONE
 

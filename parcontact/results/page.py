@@ -43,7 +43,7 @@ from ..parallel.slab import Slab
 from ..physics.prony import complex_modulus
 from ..physics.roughness import surface_statistics
 from ..printed import name_cases
-from . import info, plots, report_sections, style, surface_summary
+from . import info, inputs, plots, report_sections, style
 from .panels import Axis, Line, Panel, Shade
 from .report_sections import Chapter, Picture, ReportSection, ReportTable, compared_table, draw_panel, embed_file
 from .results import Results, swept_keys
@@ -184,9 +184,9 @@ def road_section(job: Job) -> ReportSection:
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     waves = any(not isinstance(part, Indenter) for part in job.surface)
-    statistics = ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))
+    statistics = ReportTable(("on the grid of the job", "value"), inputs.list_statistics(found))
     tables = [shapes, *([statistics] if waves else [])]
-    return ReportSection("Surface", sentences, tables, _draw(surface_summary.Sketch(heights, job.grid.size, found)))
+    return ReportSection("Surface", sentences, tables, _draw(inputs.Sketch(heights, job.grid.size, found)))
 
 
 def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
@@ -203,13 +203,13 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = surface_statistics(heights, setup.grid.size)
-    pictures = _draw(surface_summary.Sketch(heights, setup.grid.size, found), ", coarsest band")
-    tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), surface_summary.list_statistics(found))]
+    pictures = _draw(inputs.Sketch(heights, setup.grid.size, found), ", coarsest band")
+    tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), inputs.list_statistics(found))]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
 
 
-def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:
-    return [draw_panel(panel, f"{caption}{of}") for caption, panel in surface_summary.panels_of(sketch).items()]
+def _draw(sketch: inputs.Sketch, of: str = "") -> list[Picture]:
+    return [draw_panel(panel, f"{caption}{of}") for caption, panel in inputs.panels_of(sketch).items()]
 
 
 DECADES = 1.5  # range of a picture beyond the relaxation times [decades]

@@ -273,9 +273,9 @@ def draw_compound(path: Path) -> None:
             lines.append(f"{f:.8g},{3 * g.real:.8g},{3 * g.imag:.8g},{t:.4g}")
     (path / "rubber.csv").write_text("\n".join(lines) + "\n")
     found = compound.fitted(path / "rubber.csv", 0.5, 20.0, "wlf", 0.01)
-    from parcontact.results import compound_files
+    from parcontact.results import inputs
 
-    compound_files.draw_compound(found, path / "compound.png", (1.0, 1e6))
+    inputs.draw_compound(found, path / "compound.png", (1.0, 1e6))
 
 
 def report_curves(path: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from parcontact.physics.roughness import surface_statistics
-from parcontact.results import surface_summary
+from parcontact.results import inputs
 from parcontact.results.panels import draw
 
 
@@ -14,8 +14,8 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
     heights, size = np.random.default_rng(1).standard_normal((20, 60)), (6e-3, 4e-3)
     figure = Figure(figsize=(5.0, 5.0))
     axes = figure.subplots()
-    sketch = surface_summary.Sketch(heights, size, surface_statistics(heights, size))
-    draw(surface_summary.panels_of(sketch)["map of the heights"], axes)
+    sketch = inputs.Sketch(heights, size, surface_statistics(heights, size))
+    draw(inputs.panels_of(sketch)["map of the heights"], axes)
     figure.draw_without_rendering()
     box = axes.get_window_extent()
     assert box.width / box.height == pytest.approx(1.5, rel=1e-6)
@@ -25,8 +25,8 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
 def test_a_map_of_few_rows_has_all_panels(shape: tuple[int, int]) -> None:
     """Two rows or columns have no waves of their own: no spectrum is drawn along them."""
     heights, size = np.random.default_rng(1).standard_normal(shape), (6e-3, 4e-3)
-    sketch = surface_summary.Sketch(heights, size, surface_statistics(heights, size))
-    for panel in surface_summary.panels_of(sketch).values():
+    sketch = inputs.Sketch(heights, size, surface_statistics(heights, size))
+    for panel in inputs.panels_of(sketch).values():
         figure = Figure()
         draw(panel, figure.subplots())
         figure.draw_without_rendering()

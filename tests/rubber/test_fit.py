@@ -13,7 +13,7 @@ from scipy.special import gamma
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.results import compound_files
+from parcontact.results import inputs
 from parcontact.rubber import compound
 from parcontact.rubber.series import PronySeries, Vertical, Weigh
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, read_shift
@@ -76,7 +76,7 @@ def moduli(tmp_path: Path, head: str, given: tuple[int, int], drawn: "list[Figur
     rows = zip(measured.FREQUENCIES, columns[given[0]], columns[given[1]], strict=True)
     (tmp_path / "rubber.csv").write_text("\n".join([head, *(f"{f:.9g} {a:.9g} {b:.9g}" for f, a, b in rows)]) + "\n")
     made = compound.fitted(tmp_path / "rubber.csv", 0.25, None, "wlf", 0.05)
-    compound_files.draw_compound(made, tmp_path / "rubber.png")
+    inputs.draw_compound(made, tmp_path / "rubber.png")
     axes = drawn[-1].axes[0]
     return axes.get_ylabel(), {str(one.get_label()): np.asarray(one.get_ydata()) for one in axes.get_lines()}
 
