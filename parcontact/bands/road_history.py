@@ -382,28 +382,24 @@ class RoadHistory(RoadSliding):
         """Return the mean pressure [Pa] of each band at the start of a stage, and the friction of its rungs along +x at
         the end, or 0 for a band that does not settle."""
         if stage not in self._ends:
-            start, end = (self._means_at(Place(stage, t)) for t in (0.0, self.job.history[stage].seconds))
+            made, bands = self.job.history[stage], range(self.cut.count)
+            start, end = (
+                [mean_rungs(self._rungs_at(Place(stage, t), 1.0), band, self.samples) for band in bands]
+                for t in (0.0, made.seconds)
+            )
             results = self._cascade.fall(lambda band, _: start[band])
-            pressures = [self._loads(results, number)[1] for number in range(self.cut.count)]
-            settled = [self._settles(number, stage) for number in range(self.cut.count)]
+            pressures = [self._loads(results, band)[1] for band in bands]
+            distance, long = made.seconds * made.speed, [self.cut.wavelengths(band)[0] for band in bands]
+            settled = [not made.speed or distance >= SETTLED * longest for longest in long]
             friction = [np.array([rung.friction for rung in of_band]) for of_band in end]
             self._ends[stage] = pressures, [one * last for one, last in zip(settled, friction, strict=True)]
         return self._ends[stage]
-
-    def _means_at(self, place: Place) -> list[list[Rung]]:
-        rungs = self._rungs_at(place, 1.0)
-        return [mean_rungs(rungs, band, self.samples) for band in range(self.cut.count)]
 
     def _loads(self, results: Results, number: int) -> tuple[Array, float]:
         """Return the loads of the rungs of a band [Pa], and their mean pressure [Pa]."""
         rungs = self._cascade.ladders[number].rungs
         loads = results[number].weights * rungs
         return loads, float(loads @ rungs / loads.sum())
-
-    def _settles(self, number: int, stage: int) -> bool:
-        """Return True if a band slides steadily, or rests, at the end of a stage."""
-        made = self.job.history[stage]
-        return not made.speed or made.seconds * made.speed >= SETTLED * self.cut.wavelengths(number)[0]
 
 
 def plan_bands(job: Job, slab: Slab) -> Iterator[str]:

@@ -233,14 +233,11 @@ def _apply(source: Source, override: Setting) -> None:
         found = (*found, name)
         if index == len(given) - 1:
             source.put(found, override.value, override.key_place, override.place)
-        elif isinstance(node, dict) and _leaves_open(node.get(name), str(given[index + 1])):
+        elif isinstance(node, dict) and (
+            node.get(name) is None or (node[name] == "auto" and not str(given[index + 1]).isdecimal())
+        ):  # no value, or `auto`
             source.put(found, {}, override.key_place, override.key_place)
         node = node[name]
-
-
-def _leaves_open(value: Any, name: str) -> bool:
-    """Return True if a mapping with a key of this name can replace the value: no value, or `auto`."""
-    return value is None or (value == "auto" and not name.isdecimal())
 
 
 def _dead_end(node: Any, shown: str, name: str) -> str:

@@ -362,7 +362,8 @@ def run_curve(
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
         sanity.refuse_impossible(job, Timeline.from_job(job))
-        plain = _identity(job, wanted) if slab.root else {}
+        steady = {"direction": list(wanted.direction), "waves": wanted.waves}  # in which all points agree
+        plain = {**outputs.kept(listing.plain_job(job)), "steady": steady} if slab.root else {}
         directory.refuse_foreign(job.path, plain, options.restart == "never")
         goes_on = options.restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
         transforms = transforms_of(job)
@@ -388,12 +389,6 @@ def run_curve(
         finally:
             if table:
                 table.close()
-
-
-def _identity(job: Job, wanted: Request) -> dict[str, Any]:
-    """Return the data that identify a curve; of the `steady` section only those that must agree for all points."""
-    steady = {"direction": list(wanted.direction), "waves": wanted.waves}
-    return {**outputs.kept(listing.plain_job(job)), "steady": steady}
 
 
 def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:

@@ -87,7 +87,8 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     known = errors if stated and states_errors(scene.material) else None
     of_energy = add_energy_error(state.memories["errors"].energy, known, sheared, lost - state.row.dissipated)
     error_energy = error_of_energies(scene, of_energy, errors.of_area * stored, followed)
-    remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), _describe_passed(step))
+    passed = f"replaces {step.passed} further steps: at rest, under a constant load, nothing changes"
+    remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), passed if step.passed else "")
     row = StepRow(
         step.number,
         step.time,
@@ -229,13 +230,6 @@ def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
     body, now = made.solved.measures.friction, sheared.measures
     errors = sheared.error, sheared.share, sheared.time, sheared.mesh
     return add_shear(budget, body, now.friction_interface, now.friction, *errors)
-
-
-def _describe_passed(step: Step) -> str:
-    """Return a sentence on a step that replaces several; '' for other steps."""
-    if not step.passed:
-        return ""
-    return f"replaces {step.passed} further steps: at rest, under a constant load, nothing changes"
 
 
 FIELDS_OF_EFFECTS = {part: need for name, need in FIELDS_NEED.items() for part in components_of(name)}

@@ -153,14 +153,10 @@ class Scenery(Part):
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Return the data of a job without the keys that effects add to stages."""
-        stages = data.get("history")
-        return {**data, "history": [_of_any_stage(stage) for stage in stages]} if isinstance(stages, list) else data
-
-
-def _of_any_stage(stage: Any) -> Any:
-    if not isinstance(stage, dict):
-        return stage
-    return {key: value for key, value in stage.items() if key in Stage.model_fields}
+        if not isinstance(stages := data.get("history"), list):
+            return data
+        own = Stage.model_fields.keys()
+        return {**data, "history": [{k: s[k] for k in s if k in own} if isinstance(s, dict) else s for s in stages]}
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:

@@ -259,7 +259,8 @@ class ContactWatch:
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return warnings about a contact. Only a `final` contact, at the end of a stage or of a solve, is checked for
         too few cells. Raises RunError if the job turns warnings into errors."""
-        found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
+        found = [WARN_EDGE("", {"where": where})] if measures.at_edge else []
+        found += doubt_cells(measures, self.mesh, where, self.more) if final else ()
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
@@ -273,12 +274,6 @@ WARN_EDGE = Kind(
     "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "
     "larger grid.size, a smaller load or a shorter distance",
 )
-
-
-def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
-    """Yield a warning about a contact that reaches the edge of its box."""
-    if measures.at_edge:
-        yield WARN_EDGE("", {"where": where})
 
 
 WARN_BELOW_A_CELL = Kind(

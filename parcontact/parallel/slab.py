@@ -178,15 +178,9 @@ class Slab:
         """Return an uninitialised map of this rank's rows, aligned for transforms, and count its bytes in the tally."""
         return allocate(self.shape, dtype, self.tally)
 
-    def zeros(self, dtype: DTypeLike = np.float64) -> Array:
-        return self._zeros(self.shape, dtype)
-
-    def zero_maps(self, count: int) -> Array:
-        """Return contiguous maps of zeros, shape (count, rows, nx)."""
-        return self._zeros((count, *self.shape), np.float64)
-
-    def _zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
-        fields = allocate(shape, dtype, self.tally)
+    def zeros(self, dtype: DTypeLike = np.float64, maps: tuple[int, ...] = ()) -> Array:
+        """Return maps of zeros of this rank's rows, shape (*maps, rows, nx), and count the bytes in the tally."""
+        fields = allocate((*maps, *self.shape), dtype, self.tally)
         if not self.only_counts:
             fields.fill(0.0)
         return fields

@@ -201,7 +201,7 @@ class ZenerBody:
 
     def at_rest(self) -> BodyMemory:
         """Return the memory of a body at rest, in new maps."""
-        branches = self.slab.zero_maps(len(self.kept))
+        branches = self.slab.zeros(maps=(len(self.kept),))
         return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:

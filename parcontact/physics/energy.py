@@ -345,13 +345,9 @@ class ZenerEnergy:
         work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
         names = "dissipated", "branches", "crossed"
         dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)
-        elastic = self.inverse.restored(memory.elastic, _of_elastic(saved))
+        own = {name.removeprefix("elastic "): value for name, value in saved.items() if name.startswith("elastic ")}
+        elastic = self.inverse.restored(memory.elastic, own)
         return EnergyMemory(work, stored, dissipated, spring, branches, increment, crossed, elastic)
-
-
-def _of_elastic(saved: Saved) -> Saved:
-    """Return the entries of the elastic memory, by its own names."""
-    return {name.removeprefix("elastic "): value for name, value in saved.items() if name.startswith("elastic ")}
 
 
 YIELDED = 1e-6  # accuracy: relative distance of a pressure to the hardness up to which a point counts as yielded

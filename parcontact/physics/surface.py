@@ -69,10 +69,6 @@ class Shape(Protocol):
     def slope(self, x: Array, y: Array) -> tuple[Array, Array]: ...
 
 
-def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
-    return -r2 / (2.0 * radius), np.full_like(r2, -1.0 / radius)
-
-
 def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
     """Return height and slope factor of a circle; beyond the radius the height is the height of the equator."""
     inside = np.minimum(r2, radius**2)
@@ -148,7 +144,9 @@ class Round:
 
     def _profile(self, x: Array, y: Array) -> tuple[Array, Array]:
         r2 = self.along[0] * x**2 + self.along[1] * y**2
-        return (_circle if self.exact else _paraboloid)(r2, self.radius)
+        if self.exact:
+            return _circle(r2, self.radius)
+        return -r2 / (2.0 * self.radius), np.full_like(r2, -1.0 / self.radius)
 
     def height(self, x: Array, y: Array) -> Array:
         return self._profile(x, y)[0]
