@@ -97,9 +97,9 @@ def has(name: str) -> bool:
 
 
 @cache
-def _modules(name: str) -> tuple[ModuleType, ...]:
-    made = (each for each in folders() if any(one.name == name for one in iter_modules(each.__path__)))
-    return tuple(import_module(f"{each.__name__}.{name}") for each in made)
+def _with(module: str) -> tuple[ModuleType, ...]:
+    """Return the packages of the capabilities that have such a module."""
+    return tuple(each for each in folders() if any(one.name == module for one in iter_modules(each.__path__)))
 
 
 def stated(name: str) -> list[Any]:
@@ -108,6 +108,9 @@ def stated(name: str) -> list[Any]:
     return [getattr(each, name) for each in folders() if hasattr(each, name)]
 
 
-def offers(module: str, name: str) -> list[Any]:
-    """Return the objects called `name` in the modules called `module` of all capabilities that have such a module."""
-    return [getattr(each, name) for each in _modules(module) if hasattr(each, name)]
+def offers(module: str, name: str, job: Any = None) -> list[Any]:
+    """Return the objects called `name` in the modules called `module` of all capabilities that have such a module, or
+    of those capabilities only whose sections a `job` has; other modules are not imported."""
+    asked = (each for each in _with(module) if job is None or job.section(each.SECTION) is not None)
+    made = (import_module(f"{each.__name__}.{module}") for each in asked)
+    return [getattr(each, name) for each in made if hasattr(each, name)]

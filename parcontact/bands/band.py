@@ -146,7 +146,7 @@ class Probe(Protocol):
 
 def probes_of(job: Job, cut: Cut) -> list[Probe]:
     """Return new probes of all effects of a job."""
-    return [probe for made in answers("steady", "probes") for probe in made(job, cut)]
+    return [probe for made in answers("steady", "probes", job) for probe in made(job, cut)]
 
 
 class Band:

@@ -321,7 +321,7 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
         f"surfaces of each: {many}",
         f"surface: rms height {quantity(cut.rms_height, 'm', 4)}, rms slope {cut.rms_slope(cut.count - 1, 0):.4g}; "
         f"rms slopes of the bands: {', '.join(f'{cut.rms_slope(band):.3g}' for band in range(cut.count))}",
-        *(text for describe in answers("steady", "describe_bands") for text in describe(job, cut)),
+        *(text for describe in answers("steady", "describe_bands", job) for text in describe(job, cut)),
     ]
 
 

@@ -117,7 +117,8 @@ class RoadSliding:
 
     def __init__(self, job: Job, slab: Slab) -> None:
         self.job, self.slab, self.cut = job, slab, cut_bands(job)
-        self.loops: list[BandLoop] = [loop for made in answers("steady", "band_loops") for loop in made(job, self.cut)]
+        asked = answers("steady", "band_loops", job)
+        self.loops: list[BandLoop] = [loop for loops in asked for loop in loops(job, self.cut)]
         options = [option for asked in job.asked("curve_options") for option in asked(job)]
         self._columns = names_of(choose_columns(BANDS, when=options))
         self.table = None if job.history else (outputs.BANDS, self._columns)  # of a history it has the history

@@ -189,12 +189,13 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
     return {section: _load(section) for section in capabilities.in_order(needs)}
 
 
-def answers(module: str, name: str) -> list[Any]:
+def answers(module: str, name: str, job: Any = None) -> list[Any]:
     """Return all objects called `name` that effects have: effects of this package in their `module`, effects of other
-    packages in their class."""
-    others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
-    found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
-    return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
+    packages in their class. If a `job` is given, only effects whose sections it has are asked."""
+    others = [section for section in _registered() if not is_ours(section) and not why_unusable(section)]
+    asked = [section for section in others if job is None or job.section(section) is not None]
+    found = [(section, getattr(_load(section), name)) for section in asked if hasattr(_load(section), name)]
+    return [*capabilities.offers(module, name, job), *(_named(*each) for each in found)]
 
 
 def _named(section: str, offered: Any) -> Any:

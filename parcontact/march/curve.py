@@ -204,7 +204,7 @@ WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {whe
 
 def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
     """Yield warnings about the solved points of a curve: the warnings of effects, and those of `describe_missed`."""
-    for asked in answers("steady", "doubts_of_points"):
+    for asked in answers("steady", "doubts_of_points", job):
         yield from asked(points, job)
     yield from describe_missed(points, job, earlier)
 

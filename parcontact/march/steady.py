@@ -197,7 +197,7 @@ class SteadySliding:
         self.contact: Contact | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature = math.nan
-        self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
+        self.loops = [loop for loops in answers("steady", "loops", setup.job) for loop in loops(setup)]
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:
         """Allocate and return all arrays that a solve at a velocity [m/s] may hold on the finest grid."""

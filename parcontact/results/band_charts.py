@@ -227,7 +227,7 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
         found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / outputs.STEADY.resolved)
-        found += [panel for panels_of in answers("pictures", "curve_panels") for panel in panels_of(job, columns)]
+        found += [panel for panels_of in answers("pictures", "curve_panels", job) for panel in panels_of(job, columns)]
     return found + (panels_of_bands(directory) if x == "velocity" else [])
 
 

@@ -21,7 +21,7 @@ from ...job.yaml_text import Fault
 from ...parallel import fft
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
-from ...physics.prony import Exponentials, Prony, fit_exponentials
+from ...physics.prony import Exponentials, fit_exponentials
 from ...physics.records import Entry, Saved, Units
 from ..branches import factor_at, temperature_of
 from ..effect import Changes, Decision, Effect, Instant
@@ -234,21 +234,16 @@ class ThermalColumns(Effect[ThermalMemory]):
         if now.warmed and step.dt:
             pressed = self._setup.fft.forward(pressure)
             if any(step.velocity):
-                at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony(memory)
-                share = heating.pressed[1] / (heating.whole[1] or 1.0)
-                now = replace(now, depths=depths_of(pressed, self._setup.fft, *at), share=share)
-                now = replace(now, error=instant.error_friction)
+                setup, share = self._setup, heating.pressed[1] / (heating.whole[1] or 1.0)
+                times = setup.prony.relaxation_times * self.time_factor(memory)
+                at = setup.half_space, setup.units.length, step.velocity, setup.prony._replace(relaxation_times=times)
+                now = replace(now, share=share, error=instant.error_friction, depths=depths_of(pressed, setup.fft, *at))
             heating = replace(heating, depths=now.depths)
             inside = now.heat.advance(step.dt, heating, rubbed, pressed, scales, now.rise)
             outside = 0.0 if rubbed is None else float((now.rise * rubbed).sum()) * scales[0] / self._slab.points
             outside, highest = self._slab.reduce([outside], [float(now.rise.max(initial=-math.inf))])
             now = replace(now, flash=now.share * inside + (1.0 - now.share) * outside, highest=highest)
         return Changes(now)
-
-    def _prony(self, memory: ThermalMemory) -> Prony:
-        """Return the relaxation function of the last step, in the run's units."""
-        cold = self._setup.prony
-        return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
     def time_factor(self, memory: ThermalMemory) -> float:
         """Return the relaxation times at the flash temperature, divided by the job's relaxation times; 1 without

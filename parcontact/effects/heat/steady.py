@@ -180,9 +180,8 @@ class HeatLoop:
 
 
 def loops(setup: Setup) -> Iterator[HeatLoop]:
-    """Yield the loop that finds the temperatures of steady states, if the job has a `thermal` section."""
-    if setup.job.section("thermal") is not None:
-        yield HeatLoop(setup)
+    """Yield the loop that finds the temperatures of steady states."""
+    yield HeatLoop(setup)
 
 
 def no_material(speed: float, pressure: float, temperature: float, error: InputError) -> UnsolvedError:
@@ -362,9 +361,8 @@ class HeatProbe:
 
 
 def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
-    """Yield the probe that measures g(m) and S_j(m) of bands, if the job has a `thermal` section."""
-    if job.section("thermal") is not None:
-        yield HeatProbe(job, cut)
+    """Yield the probe that measures g(m) and S_j(m) of bands."""
+    yield HeatProbe(job, cut)
 
 
 class HeatOfBands:
@@ -439,6 +437,5 @@ class HeatOfBands:
 
 
 def band_loops(job: Job, cut: Cut) -> Iterator[HeatOfBands]:
-    """Yield the loop that finds the temperatures of bands, if the job has a `thermal` section."""
-    if job.section("thermal") is not None:
-        yield HeatOfBands(job, cut)
+    """Yield the loop that finds the temperatures of bands."""
+    yield HeatOfBands(job, cut)

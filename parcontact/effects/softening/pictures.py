@@ -15,11 +15,8 @@ NAMES = ("G' storage", "G'' loss")
 
 def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Panel]:
     """Yield the panel of the factors of both moduli against strain, with marks at the strains of a friction curve
-    (`columns`), for jobs with softening."""
-    section = job.section("softening")
-    if section is None:
-        return
-    table, found = section.made, columns["strain_amplitude"]
+    (`columns`)."""
+    table, found = job.section("softening").made, columns["strain_amplitude"]
     marked = np.sort(found[np.isfinite(found)])
     strain = np.geomspace(min(table.strain[0], *marked), max(table.strain[-1], *marked), POINTS)
     series = []

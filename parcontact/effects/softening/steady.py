@@ -264,9 +264,8 @@ class StrainLoop:
 
 
 def loops(setup: Setup) -> Iterator[StrainLoop]:
-    """Yield the loop that finds the strains of steady states, if the job has a `softening` section."""
-    if setup.job.section("softening") is not None:
-        yield StrainLoop(setup)
+    """Yield the loop that finds the strains of steady states."""
+    yield StrainLoop(setup)
 
 
 WARN_STRAINS_BEYOND_THE_SWEEP = Kind(
@@ -278,11 +277,11 @@ WARN_STRAINS_BEYOND_THE_SWEEP = Kind(
 
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
     """Yield a warning if strains of a friction curve are outside the table of factors."""
-    section = job.section("softening")
-    strained = [(point.effects["softening"], point.speed) for point in points if section]
-    beyond = [each for each in strained if each[0] > 0.0 and not section.made.reaches(each[0])]  # NaN without friction
+    table = job.section("softening").made
+    strained = [(point.effects["softening"], point.speed) for point in points]
+    beyond = [each for each in strained if each[0] > 0.0 and not table.reaches(each[0])]  # NaN without friction
     if beyond:
-        low, high = section.made.strain[0], section.made.strain[-1]
+        low, high = table.strain[0], table.strain[-1]
         strain, speed = max(beyond, key=lambda each: abs(math.log(each[0] / math.sqrt(low * high))))
         facts = {"strain": strain, "speed": speed, "low": low, "high": high}
         yield WARN_STRAINS_BEYOND_THE_SWEEP("softening", {**facts, "count": len(beyond), "points": len(points)})
@@ -293,16 +292,13 @@ BINS = 12  # accuracy: bins of wavenumbers in a band
 
 def describe_bands(job: Any, cut: Any) -> Iterator[str]:
     """Yield a sentence with the strain and the factors f and g of each band of a job (`bands.choice.Cut`)."""
-    section = job.section("softening")
-    if section is None:
-        return
     edges = np.concatenate(
         [np.geomspace(cut.edges[k], cut.edges[k + 1], BINS + 1)[int(k > 0) :] for k in range(cut.count)]
     )
     q = np.sqrt(edges[1:] * edges[:-1])
     slopes = np.array([cut.spectrum.moment(float(a), float(b), 2) for a, b in pairwise(edges)])
     strains = strains_in_full_contact(q, slopes, np.arange(q.size) // BINS, cut.count)
-    f, g = section.made.factors(strains)
+    f, g = job.section("softening").made.factors(strains)
     each = (f"{strain:.2g} (f {a:.2g}, g {b:.2g})" for strain, a, b in zip(strains, f, g, strict=True))
     yield f"softening: strains of the bands in full contact {', '.join(each)}"
 
@@ -331,9 +327,8 @@ class StrainProbe:
 
 
 def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
-    """Yield the probe that measures the strains of bands, if the job has a `softening` section."""
-    if job.section("softening") is not None:
-        yield StrainProbe(job, cut)
+    """Yield the probe that measures the strains of bands."""
+    yield StrainProbe(job, cut)
 
 
 class StrainsOfBands:
@@ -381,6 +376,5 @@ def _strains_in(results: Results) -> Array:
 
 
 def band_loops(job: Job, cut: Cut) -> Iterator[StrainsOfBands]:
-    """Yield the loop that finds the strains of bands, if the job has a `softening` section."""
-    if job.section("softening") is not None:
-        yield StrainsOfBands(job, cut)
+    """Yield the loop that finds the strains of bands."""
+    yield StrainsOfBands(job, cut)
