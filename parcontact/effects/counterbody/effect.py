@@ -40,11 +40,8 @@ def pair(first: Moduli, second: Moduli) -> Prony:
     terms, times = np.append(one.moduli, other.moduli), np.append(one.relaxation_times, other.relaxation_times)
     whole = normal_form(one.modulus_inf + other.modulus_inf, terms, times)
     a, b = (_on_times(body, whole) for body in (one, other))
-    zeros = retardation(whole)
-    products = [
-        abs(_at(zero, one, a, whole) * _at(zero, other, b, whole)) for zero in zeros
-    ]  # G1 = -G2 but for rounding
-    moduli = [product / (zero.time * zero.slope) for product, zero in zip(products, zeros, strict=True)]
+    zeros = retardation(whole)  # G1 = -G2 there but for rounding
+    moduli = [abs(_at(z, one, a, whole) * _at(z, other, b, whole)) / (z.time * z.slope) for z in zeros]
     shared = a * b / (a + b)
     spring = one.modulus_inf * other.modulus_inf / whole.modulus_inf if whole.modulus_inf else 0.0
     slow = [zero.time for zero in zeros]

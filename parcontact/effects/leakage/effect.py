@@ -215,12 +215,6 @@ def _has_map(leakage: Leakage | None, output: Any) -> Iterator[Fault]:
         yield from limits.no_field["fluid_pressure"](output)
 
 
-RULES = (
-    *rules_of(_needs_steps, _stages, _no_free_box, _has_map, _refused, _no_steady),
-    *map(_excludes, ("adhesion", "interface", "thermal")),
-)
-
-
 NOTHING = (math.nan, math.nan, math.nan)
 
 
@@ -239,7 +233,10 @@ class LeakageColumns(Effect[tuple[float, ...]]):
     section: ClassVar[type[Part]] = Leakage
     columns: ClassVar[tuple[str, ...]] = added_by("leakage")
     stage: ClassVar[type[Stage]] = SealStage
-    rules: ClassVar[tuple[Rule, ...]] = RULES
+    rules: ClassVar[tuple[Rule, ...]] = (
+        *rules_of(_needs_steps, _stages, _no_free_box, _has_map, _refused, _no_steady),
+        *map(_excludes, ("adhesion", "interface", "thermal")),
+    )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["fluid_pressure"],)
 
     @staticmethod

@@ -273,16 +273,13 @@ def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
         yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
 
 
-RULES = rules_of(only_in_steady_sliding, in_a_periodic_box, of_rubber)
-
-
 class SofteningEffect(Effect[None]):
     """Effect of strain softening. It has no part in steps: jobs with a history are refused."""
 
     section: ClassVar[type[Part]] = Softening
     in_curves: ClassVar[bool] = True
     columns: ClassVar[tuple[str, ...]] = ()
-    rules: ClassVar[tuple[Rule, ...]] = RULES
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(only_in_steady_sliding, in_a_periodic_box, of_rubber)
     forbids: ClassVar[Mapping[str, str]] = {
         BY_THEORY: "the theory excludes softening, as its moduli do not depend on the strain: leave out softening"
     }
