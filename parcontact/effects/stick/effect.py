@@ -1,13 +1,13 @@
 """Stick and slip of the contact area: a body is sheared before it slides, and while parts of its contact slide.
 
-The rigid surface moves by D along itself, the points of the body by u under tractions t that are bounded,
+The rigid surface moves by D along itself. Tractions t move the points of the body by u. The tractions are bounded,
 
     |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
 A shear strength that depends on the velocity is the same at all points in a step. It is taken at the velocity of the
-surface along itself, and not at the velocities of slip, for which a step could have several solutions. While the
-surface rests, the last strength holds. Before the surface has moved, there are no tractions, and the highest strength
-is the bound.
+rigid surface, and not at the velocities of slip, with which a step could have several solutions. While the surface
+rests, the last strength holds. Before the surface first moves, there are no tractions, and the bound is the highest
+strength.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
@@ -17,17 +17,17 @@ incompressible half space tractions and pressures move the surface independently
     A t = G_inf u + sum_k h_k,
 
 so that a step to the tractions `alpha t` is the problem of `solver`. A point that sticks ends at the displacement g,
-its last displacement plus the increment of D (its `target`), and
+its `target`: its last displacement plus the increment of D. With the map m of `physics.body`,
 
-    e = g + r/alpha,    w = e - A t = g - u.
+    e = g + m/alpha,    w = e - A t = g - u.
 
 Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
 and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
 step. A point without contact has g = u, so that its slip counts from its first contact.
 
-The residuals of solves must not add up over many steps. So the target g of a point that sticks is not set to the
-displacement u that was found, and the target of a point that slips contains the difference between its traction and its
-bound, which the next solve corrects.
+The residuals of solves must not add up over many steps. So the target g of a point that sticks stays as it is, and is
+not set to the displacement u of the solution. The target of a point that slips contains the difference between its
+traction and its bound, and the next solve corrects this difference.
 
 The shape of a surface that rolls moves over the body, but its points move along the body only by a share of this
 motion, the creep (F. W. Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the
@@ -38,7 +38,7 @@ With output.energy the work of the tractions on the body is added to the work of
     sum max(0, (t_old + t)/2 (s - s_old)),
 
 so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a step,
-the trapezoidal rule may give less than 0, which is then replaced by 0.
+the trapezoidal rule may give a negative loss, which is replaced by 0.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ class BoundedTraction(NamedTuple):
 class StickMemory:
     """Memory of stick and slip. Maps are in the run's units, and have two stacked components except those of bounds.
 
-    `body` is the memory of the displacements along the surface. `last` has the tractions of the last step and their
-    bounds, divided by its modulus `alpha`; the next ones are put into `spare`. `target` is the displacement that points
-    would have if they all stuck. `strength` is the shear strength [Pa] of the last step in which the surface moved.
-    `share` is the mean traction divided by the mean bound. `energy` is the memory of the energies, or None if the job
-    asks for none, and `lost` the energy lost in slip [J]. `columns` are the values of the columns in the last row,
-    except `slip_loss`.
+    `body` is the memory of the displacements along the surface. `last` has the tractions and the bounds of the last
+    step, divided by the modulus `alpha` of that step. `spare` has the maps for the tractions and bounds of the next
+    step. `target` is the displacement that points would have if they all stuck. `strength` is the shear strength [Pa]
+    of the last step in which the surface moved. `share` is the mean traction divided by the mean bound. `energy` is the
+    memory of the energies, or None if the job asks for none, and `lost` the energy lost in slip [J]. `columns` are the
+    values of the columns in the last row, except `slip_loss`.
     """
 
     body: BodyMemory
@@ -244,8 +244,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return sheared, mean, round(stuck) / self._slab.points
 
     def values(self, memory: StickMemory) -> Sequence[float]:
-        """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J]. The
-        latter is NaN if the job asks for no energies."""
+        """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J]. This
+        energy is NaN if the job asks for no energies."""
         return *memory.columns, math.nan if memory.energy is None else memory.lost
 
     def field(self, memory: StickMemory, name: str) -> Array:

@@ -7,32 +7,37 @@ With A the operator of the body, from tractions to displacements, and bounds f o
 w is the slip in a step in which a point that sticks ends at the displacement e. The solution minimizes the convex
 function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
 
-1. Points slip where t was shortened to its disc and w is not opposite to t; the others stick. The traction of a point
-that slips can only turn. Both the body and the slip resist this: A is replaced by `A + |w|/f` there. 2. The residual r
-is w where points stick, and the part of w across t where they slip. The direction z is `S E' K E S r + (1 -
-S^2)/(1/kappa + |w|/f) r + k <w>`. K is close to the inverse of A, and E extends each component beyond the points that
-move along it (`preconditioner.extension`). S is 1 where points stick; where they slip it is the root of `a/(a +
-|w|/f)`, with the compliance a of the shortest waves. K is left out for a component with a small residual. <w> is the
-mean slip of the points that stick. In a periodic box a mean traction does not move the surface, and these points resist
-mean slip with about `k = kappa/(1 - m)`, where m is their share of the box: much more than K assumes. 3. With d the
-last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma minimizes J along d:
-both follow from A d, which is known. Then tractions that slip get the length f, and longer ones are shortened to f. 4.
-Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
-least J, and A t follows without another application of A. So J never rises. If all points stick and J would be least
-far beyond the new tractions, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows. 5. If
-t has moved by a small part of the change, the next iteration takes `t + kappa w`, shortened to its disc, for the new
-tractions, which always descends.
+1. A point slips if its traction t was shortened to its disc and w is not opposite to t; other points stick. The
+   traction of a point that slips can only turn. Both the body and the slip resist this turn: at such points A is
+   replaced by `A + |w|/f`.
+2. The residual r is w where points stick, and the part of w across t where points slip. The direction z is `S E' K E S
+   r + (1 - S^2)/(1/kappa + |w|/f) r + k <w>`. K is close to the inverse of A, and E extends each component beyond the
+   points that move along it (`preconditioner.extension`). S is 1 where points stick. Where points slip, S is the root
+   of `a/(a + |w|/f)`, with the compliance a of the shortest waves. K is left out for a component with a small residual.
+   <w> is the mean slip of the points that stick. In a periodic box a mean traction does not move the surface, and these
+   points resist mean slip with about `k = kappa/(1 - m)`, where m is their share of the box. This is much more than K
+   assumes.
+3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
+   minimizes J along d: both follow from A d, which is known. Then tractions of points that slip get the length f, and
+   longer tractions are shortened to f.
+4. Discs are convex, so that all tractions between the old and the new tractions are admissible. t becomes the one with
+   the least J, and A t follows without another application of A. So J never rises. If all points stick, J may be least
+   far beyond the new tractions. Then K is much smaller than the inverse of A, as in a free row of long cells, and STEP
+   grows.
+5. If t has moved by only a small part of the change, the next iteration uses `t + kappa w`, shortened to its disc, as
+   the new tractions. J always falls towards these tractions.
 
 kappa is a stiffness of the contact as a whole. The certificate is the larger of two errors of t, divided by the sum of
-|t|: `sum |P(t + kappa w) - t|` with P(t) = t shortened to its disc, and the change in step 3, where K measures
-residuals of all wavelengths. The certificate is 0 only for the solution, and equals the relative error of tractions
-where K is close to the inverse of A. In many small steps points would slip by these errors, which add up. So a solve
-ends when the certificate is below the tolerance and below a share of the change of t since the last step; a tenth of
-the tolerance always suffices. `contact.solver` uses the same method for the constraint p >= 0.
+|t|. One error is `sum |P(t + kappa w) - t|`, where P(t) is t shortened to its disc. The other error is the change in
+step 3, in which K measures residuals of all wavelengths. The certificate is 0 only for the solution, and equals the
+relative error of tractions where K is close to the inverse of A. In many small steps points would slip by these errors,
+which add up. So a solve ends when the certificate is below the tolerance, and also below a share of the change of t
+since the last step. A certificate of a tenth of the tolerance always suffices. `contact.solver` uses the same method
+for the constraint p >= 0.
 
 The operator A takes tractions along the surface of a half space to displacements along the surface.
 
-A wave of tractions t, two components, moves the surface of an elastic half space of shear modulus 1 by
+A wave of tractions t, with two components, moves the surface of an elastic half space of shear modulus 1 by
 
     u^(q) = 1/|q| (I - nu q q^T/q^2) t^(q).
 
@@ -41,7 +46,7 @@ incompressible half space (nu = 1/2) tractions do not move the surface along its
 surface along itself (K. L. Johnson, Contact Mechanics, 1985, section 3.6).
 
 The mean displacement of a periodic half space is 0. In a free box tractions are constant on each cell, and the
-displacement at a distance (x, y) from the centre of a cell is the integral over it of Cerruti's solution
+displacement at a distance (x, y) from the centre of a cell is the integral of Cerruti's solution over the cell
 
     u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi),
 
@@ -71,8 +76,8 @@ ACROSS = 0.5  # tuning: least component of a traction across an axis, over the o
 
 @loop
 def shorten_to_bounds(bound, x, y, hit):
-    """Shorten the tractions (x, y) to their bounds, and mark in `hit` the shortened ones; a bound of 0 gives no
-    traction."""
+    """Shorten the tractions (x, y) to their bounds, and mark the shortened tractions in `hit`. Where the bound is 0,
+    the traction becomes 0."""
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             size, most = math.hypot(x[j, i], y[j, i]), bound[j, i]
@@ -113,9 +118,9 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
     or `t + kappa w` exceeds its bound. The map `turn` gets |w|/f for points that slip, with the part of w along t and
     the bound f.
 
-    Return eight sums. P(t) is the traction t shortened to its bound. The first three are the sums of |t|, |P(t + kappa
-    w)| and `|P(t + kappa w) - t|`, the next two those of the magnitudes of both components of `P(t + kappa w) - t`. The
-    last three are over the points that stick: of both components of w, and the number of these points.
+    Return eight numbers, where P(t) is the traction t shortened to its bound: the sums of |t|, of `|P(t + kappa w)|`
+    and of `|P(t + kappa w) - t|`; the sums of the magnitudes of the x and the y component of `P(t + kappa w) - t`; the
+    sums of the x and the y component of w over the points that stick; and the number of points that stick.
     """
     size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     w_sticks_x, w_sticks_y, count = 0.0, 0.0, 0.0
@@ -397,9 +402,9 @@ Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t 
 
 
 class TractionProblem(NamedTuple):
-    """Input of a solve: the map `bound` of the bounds f; the map `aim` of the displacements e at which points that
-    stick end, with stacked components; a stiffness `kappa` of the contact, in the unit of tractions divided by the unit
-    of displacements; and the `tolerance` of the certificate."""
+    """Input of a solve. `bound` is the map of the bounds f. `aim` is the map of the displacements e at which points
+    that stick end, with stacked components. `kappa` is a stiffness of the contact, in the unit of tractions divided by
+    the unit of displacements. `tolerance` is that of the certificate."""
 
     bound: Array
     aim: Array
@@ -409,8 +414,9 @@ class TractionProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class Tractions:
-    """Result of a solve, whose tractions t are in the map of the start. The map `displacement` has A t; it belongs to
-    the solver and is valid until the next solve. `failure` is empty, or states why the tolerance was not reached."""
+    """Result of a solve. The tractions t replace those in the map from which the solve started. The map `displacement`
+    has A t; it belongs to the solver and is valid until the next solve. `failure` is empty, or states why the tolerance
+    was not reached."""
 
     displacement: Array
     certificate: float
@@ -542,9 +548,9 @@ def settle_slips(bound, stiffness, alpha, t_x, t_y, alpha_old, old_x, old_y, u_x
     """Find the points that stick after a step, and move the targets of all others.
 
     Let s be `target - u`, k the `stiffness`, and P the traction `t + k s` shortened to its bound. A point sticks if `t
-    + k s` is shorter than its bound. For every other point let `r = (P - t)/k`, which is 0 for exact tractions: the
-    point slips by `s - r`, and its target becomes `u + r`. So an error of t is kept until a solve corrects it. A point
-    that slips loses the energy `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative.
+    + k s` is shorter than its bound. Every other point slips by `s - r` with `r = (P - t)/k`, which is 0 for exact
+    tractions, and its target becomes `u + r`. So an error of t is kept until a solve corrects this error. A point that
+    slips loses the energy `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative.
 
     The map `slipping`, unless it is empty, gets `t (s - r)`, which is proportional to the power of slip at the end of
     the step. Return six sums: of the losses, of t along x, of t along y, and of the bounds; the number of points that
