@@ -26,18 +26,18 @@ layer. These waves displace a layer by
 
     u = c0 p - c2 laplace p,
 
-where c0 = 0 for a bonded incompressible layer, which flows along its base like a viscous film. Under this pressure the
+where c0 = 0 for a bonded incompressible layer, which flows along its base like a viscous film. For these waves the
 layer is far stiffer than for its softest wave. Yet K must limit the stiffness of long waves to that of the softest
-wave: the pressure vanishes outside contact, and patches of contact do not interact if they are further from each other
-than the thickness. So a second part is added to K z, which acts within each patch. It solves the equation above for the
-pressure on the contact,
+wave: the pressure vanishes outside contact, and patches of contact do not interact if their distance is larger than the
+thickness. So a second part is added to the pressure that K gives. This part acts within each patch, and solves the
+equation above for the pressure on the contact,
 
     c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
 
-with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle over cells of
-two by two cells approximates the solution. It starts with cells of half the thickness, as K treats shorter waves, and
-makes one damped Jacobi step on the way to larger cells and one on the way back, so that it is symmetric. Maps are in
-single precision.
+with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle, in which cells
+are joined two by two, approximates the solution. The V-cycle starts with cells of half the thickness, since K treats
+shorter waves. It makes one damped Jacobi step on the way to larger cells and one on the way back, so that the
+preconditioner is symmetric. Maps are in single precision.
 """
 
 from __future__ import annotations
@@ -347,7 +347,7 @@ NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a bod
 
 class Body(Part):
     """The section `body`: the body is a layer, which is bonded to a rigid base or slides on it without friction.
-    Without this section it is a half space."""
+    Without this section the body is a half space."""
 
     thickness: Positive = Field(description="a positive thickness [m]")
     base: Base = "bonded"
@@ -439,7 +439,7 @@ WARN_HIGH_FOR_A_LAYER = Kind(
 
 def doubt_span(job: Any, span: float) -> Iterator[Doubt]:
     """Yield a warning if a surface with the height `span` [m] from its lowest to its highest point is too high for the
-    layer. There is none if `doubts_of_layer` already warns without the heights of the surface."""
+    layer. Yield none if `doubts_of_layer` warns already, for which it does not need the heights of the surface."""
     if not any(_too_high(job, _least_height(job.surface))):
         yield from _too_high(job, span)
 
@@ -481,7 +481,7 @@ def _least_height(surface: tuple[Any, ...]) -> float:
 
 
 class RubberLayer(Effect[None]):
-    """A layer on a rigid base."""
+    """Effect of the section `body`: the body is a layer on a rigid base."""
 
     section: ClassVar[type[Part]] = Body
     columns: ClassVar[tuple[str, ...]] = ()
