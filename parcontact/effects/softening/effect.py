@@ -67,8 +67,8 @@ class StrainTable:
 
 @dataclass(frozen=True)
 class Softened:
-    """Factors of the moduli for each wave, which the strain of the wave's octave determines. `strains` has one item per
-    octave.
+    """Factors of the moduli for each wave. The factors of a wave follow from the strain of its octave. `strains` has
+    one item per octave [-].
 
     The first octave begins at the wavelength `longest`, in any unit of length. The last octave contains all shorter
     waves.
@@ -106,9 +106,9 @@ def strains_in_full_contact(q: Array, slopes: Array, group: NDArray[np.int64], c
     waves with the wavenumbers q, both of shape (n,). `group` has the number of each wave's group, below `count`. The
     strain of a group without waves is NaN.
 
-    All waves j strain the rubber in which the wave of wavenumber q dissipates. With r = k_j/q the square of the strain
-    of this wave is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`, where `(k_j A_j)^2` is twice the mean square slope
-    of the wave j.
+    All waves j strain the rubber in which a wave of wavenumber q dissipates. With the wavenumbers k_j, the amplitudes
+    A_j and r = k_j/q, the square of the strain of this wave is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`. `(k_j
+    A_j)^2` is twice the mean square slope of the wave j.
     """
     ratio = q / q[:, None]
     squares = (24.0 * slopes * ratio**2 / (1.0 + ratio) ** 5).sum(axis=1)

@@ -71,7 +71,7 @@ class StrainsAtDepth:
     power: Array
 
     def of_octaves(self, otherwise: Array) -> Array:
-        """Return the strain [-] of each octave, shape (octaves,). An octave without power gets its value in
+        """Return the strain [-] of each octave, shape (octaves,). The strain of an octave without power is the item of
         `otherwise`."""
         found = np.sqrt(self.weights @ self.squares)
         return np.where(found > 0.0, found, otherwise)
@@ -291,7 +291,7 @@ BINS = 12  # accuracy: bins of wavenumbers in a band
 
 
 def describe_bands(job: Any, cut: Any) -> Iterator[str]:
-    """Yield a sentence with the strain and the factors f and g of each band of a job (`bands.choice.Cut`)."""
+    """Yield a sentence with the strain and the factors f and g of each band of a job. `cut` is a `bands.choice.Cut`."""
     edges = np.concatenate(
         [np.geomspace(cut.edges[k], cut.edges[k + 1], BINS + 1)[int(k > 0) :] for k in range(cut.count)]
     )
@@ -347,7 +347,7 @@ class StrainsOfBands:
         self._enough = SHARE * job.numerics.asked.both[0]
 
     def begin(self, road: RoadSliding) -> None:
-        """Do nothing. The strains of the last state are kept, from which the new state starts."""
+        """Do nothing: a new state starts from the strains of the last state."""
 
     def act(self, road: RoadSliding) -> None:
         road.set_factors(self._table.at, self._strains.tolist())
