@@ -148,8 +148,8 @@ class Leakage(Part):
         return self.drop(given.at((time - started) / lasts if lasts else 1.0, lasts))
 
     def before(self, history: Any, stage: int) -> Pair:
-        """Return the high and the low pressure [Pa] with which a stage of the `history` begins if it has none of its
-        own."""
+        """Return the high and the low pressure [Pa] with which a stage of the `history` begins if the stage gives no
+        pressures."""
         given = (each.fluid_pressures for each in reversed(history[:stage]))
         assert self.pressures is not None
         return next((ramp.end for ramp in given if ramp is not None), self.pressures)
@@ -293,8 +293,8 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
 @dataclass(frozen=True)
 class SealColumns:
-    """Memory of the effect `Seal`: the values of its columns, the map of the fluid's pressure above ambient [Pa], and
-    True in `warned` if a warning about inertia was given."""
+    """Memory of the effect `Seal`: the values of its columns, and the map of the fluid's pressure above ambient [Pa].
+    `warned` is True after a warning about inertia."""
 
     columns: tuple[float, ...]
     pressure: Array

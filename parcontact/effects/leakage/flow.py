@@ -21,7 +21,7 @@ neighbours, and its pressure is
 This eliminates all white cells, half of the unknowns, and leaves a symmetric matrix for the black cells, with up to
 eight neighbours each. This matrix is factorized directly, since iterations would stall: g^3 spans many decades.
 
-A fluid is a liquid or a gas, which expands and slips at the walls. A pressure that falls from p1 to p2 over the length
+A fluid is a liquid or a gas. A gas expands, and slips at the walls. A pressure that falls from p1 to p2 over the length
 L of a gap of conductivity K drives through a width W the flow
 
     liquid   Q = K/(12 eta) (p1 - p2) W/L,
@@ -371,8 +371,8 @@ def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: st
 def flow_mesh_error(
     gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
-    """Return the relative change of K if only every second point of the gap is used. The points start with the first or
-    with the second one, whichever changes K more. Return NaN if contact closes the gap. `gap`, `size`, `axis` and
+    """Return the relative change of K if only every second point of the gap is used. These points start with the first
+    or with the second point, whichever changes K more. Return NaN if contact closes the gap. `gap`, `size`, `axis` and
     `periodic_sides` are as in `solve_flow`."""
     if not flow.percolates:
         return math.nan

@@ -9,9 +9,9 @@ width is
     gas        M/(12 eta R T L) int K(p0 + p_a - p) p dp    [kg/(m s)],
 
 integrated from the low to the high pressure; the other symbols are those of `flow`. K of a gas includes the slip at the
-pressure p. In this module K of a gas is multiplied by p and divided by the mean pressure, so that both integrals are
-the same. Between loads the logarithm of K is interpolated without new extrema (F. N. Fritsch and R. E. Carlson, SIAM J.
-Numer. Anal. 17 (1980) 238). Between pressures K is interpolated by a parabola, as it is almost linear in p.
+pressure p. In this module K of a gas is multiplied by p and divided by the mean pressure, so that both integrals have
+the same form. Between loads the logarithm of K is interpolated without new extrema (F. N. Fritsch and R. E. Carlson,
+SIAM J. Numer. Anal. 17 (1980) 238). Between pressures K is interpolated by a parabola, as it is almost linear in p.
 """
 
 import math
@@ -113,7 +113,7 @@ def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
 
 
 def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float]) -> None:
-    """Raise InputError if the saved loads cover the local loads of none of the `loads` [Pa]."""
+    """Raise InputError if for each of the `loads` [Pa] some local loads are outside the range of the saved loads."""
     if not any(curve.covers(*drop.local_loads(load)) for load in loads):
         highest = float(curve.loads[-1])
         least, most = drop.local_loads(highest)
@@ -129,9 +129,9 @@ def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float
 
 
 def describe_cover(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float], shown: float) -> Iterator[str]:
-    """Yield a sentence on those of the `loads` [Pa] for which some local loads are outside the saved loads, so that
-    their rows of leak.csv lack the flow. Yield another sentence if too few saved loads are among the local loads for
-    the load `shown` [Pa]."""
+    """Yield a sentence if the flow is unknown for some of the `loads` [Pa], as some of their local loads are outside
+    the range of the saved loads. Rows of leak.csv for these loads lack the flow. Yield another sentence if too few
+    saved loads lie within the local loads of the load `shown` [Pa]."""
     ends = [drop.local_loads(load) for load in loads if load > 0.0]
     empty = [end for end in ends if not curve.covers(*end)]
     if empty:
@@ -191,9 +191,9 @@ class LeakInstant(NamedTuple):
 
     `flow_rate` [m^3/s] and `mass_flow` [kg/s] are the flow of a fluid in the direction with the larger constriction, if
     contact carries all of the load. `flow_rate_total` and `mass_flow_total` are this flow if the fluid carries a part
-    of the load. They are NaN if not asked for. `parts` has a pair for x and a pair for y: the conductivities for the
-    fluid [m^3] if contact carries all of the load, and if the fluid carries a part of it; `parts` is empty if the
-    second ones are not asked for.
+    of the load. Flows that were not asked for are NaN. `parts` has a pair of conductivities for the fluid [m^3] along
+    x, and a pair along y. The first conductivity of a pair is for a contact that carries all of the load, the second
+    for a fluid that carries a part of the load. `parts` is empty if the second conductivities were not asked for.
     """
 
     time: float
@@ -218,9 +218,9 @@ class LeakInstant(NamedTuple):
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without maps. The other items are pairs, for x and y: the relative mesh `errors` of K; in
-    `of_fluid` the conductivities [m^3] for a fluid with slip, at each of `PressureDrop.pressures`; and the smallest
-    open `sections` [m^2]."""
+    """The flow at an instant, without maps. `errors`, `of_fluid` and `sections` are pairs, for x and y. `errors` are
+    the relative mesh errors of K. `of_fluid` has the conductivities [m^3] for a fluid with slip, at each of
+    `PressureDrop.pressures`. `sections` are the smallest open sections [m^2]."""
 
     leak: Leak
     errors: tuple[float, float]
@@ -229,8 +229,8 @@ class SolvedLeak(NamedTuple):
 
 
 class Gaps:
-    """The saved gaps of a run in `directory`, at all instants or, if `at` is given, at one. `drop` is the pressure drop
-    of a fluid. Raises InputError if no gap is saved."""
+    """The saved gaps of a run in `directory`: at the instant `at`, or at all instants if `at` is ''. `drop` is the
+    pressure drop of a fluid. Raises InputError if no gap is saved."""
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
@@ -300,8 +300,9 @@ class Gaps:
         return tuple(solve_flow(slipping, self.size, axis, self._sides(axis)).conductivity for slipping in gaps)
 
     def refuse_memory(self, at: str) -> None:
-        """Raise InputError if K is not a function of the load alone. This is the case if the contact has a memory, if
-        the fluid of the run already carries a part of the load, and if `at` selects a single instant."""
+        """Raise InputError if K is not a function of the load alone. This is the case if the contact has a memory, or
+        if the fluid of the run already carries a part of the load. Raise InputError also if `at` selects a single
+        instant."""
         if (section := self.job.section("leakage")) is not None and section.total:
             raise InputError(
                 "--load total is for runs whose contact carries all of the load: the fluid of "
@@ -373,8 +374,8 @@ def write_leakage(
 
     `over` is the axis on which K is drawn: pressure, time, or "" for an automatic choice. `drop` adds the flow of a
     fluid. Root yields sentences on the results. Raises InputError if the directory has no saved gaps. If the fluid
-    carries a part of the load, raises InputError also if K is no function of the load, or if the saved loads cover the
-    local loads of no row.
+    carries a part of the load, raises InputError also if K is no function of the load, or if the flow is unknown in
+    every row.
     """
     gaps = Gaps(directory, at, drop)
     total = drop is not None and drop.total

@@ -24,7 +24,7 @@ THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker":
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return True where a constriction [m] is open but too narrow for continuum flow; an array for an array."""
+    """Return True where a constriction [m] is open but too narrow for continuum flow, in the shape of `constriction`."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 
@@ -120,8 +120,8 @@ def draw_leakage(
 
 
 def panel_of(rows: Sequence[Any], over: str) -> Panel:
-    """Return the panel of K against `over`, which is pressure or time; by default time if a pressure occurs more than
-    once.
+    """Return the panel of K against `over`, which is pressure or time. If `over` is '', K is drawn against time if
+    successive instants have the same pressure, else against pressure.
 
     If the pressure stays constant over several instants, the panel against pressure shows only the last one of them.
     """

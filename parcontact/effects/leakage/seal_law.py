@@ -10,8 +10,8 @@ where p0 is the load above ambient, and <> the mean over the box. Each round fir
 `h - A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through its gap, which gives the next
 p~. Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
 
-The fluid flows along x. In contact and in closed pools the flow does not determine the pressure p. A small leak eps
-determines it there, which is SMALL times the mean of g^3:
+The fluid flows along x. In contact and in closed pools the flow does not determine the pressure p. There, a small leak
+eps determines the pressure. It is SMALL times the mean of g^3:
 
     div((g^3 + eps) grad p) = 0                            for a liquid,
     div((g^3 + 6 lambda g^2 + eps) grad p^2) = 0           for a gas.
@@ -211,8 +211,7 @@ def seal_flow(
     pass, after the last round.
 
     `gap` [m] and `share` are the maps of the gap and of s, and `size` is (lx, ly) [m]. `rounds` is None if the pressure
-    of the fluid is the ambient one everywhere. The gap counts as closed if less flows through it than through the small
-    leak.
+    of the fluid is ambient everywhere. The gap counts as closed if less flows through it than through the small leak.
     """
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)
