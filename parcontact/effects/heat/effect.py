@@ -92,15 +92,16 @@ class Thermal(Part):
         return Conductor(self.conductivity, self.diffusivity)
 
     def sliding_time(self, grid: Grid, speed: float) -> float:
-        """Return the time [s] for which sliding at a `speed` [m/s] has warmed the rubber. The rubber has slid over
-        `distance`. Without this key it has slid once through a periodic box, and for an infinite time in a free box."""
+        """Return the time [s] for which sliding at a `speed` [m/s] has warmed the rubber. The rubber has slid over the
+        distance of the key `distance`. Without this key it has slid over the length of a periodic box, or for an
+        infinite time in a free box."""
         free = grid.boundary == "free"
         return (self.distance or (math.inf if free else max(grid.size))) / speed
 
 
 def exponentials_of(job: Any) -> Exponentials:
-    """Return the sum of exponentials that describes the conduction of heat in the rubber of a job. It holds for times
-    from the shortest sliding step to DECAYED diffusion times of the longest wave in the box."""
+    """Return the sum of exponentials that describes the conduction of heat in the rubber of a job. The sum is accurate
+    for times from the shortest sliding step to DECAYED diffusion times of the longest wave in the box."""
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
@@ -118,10 +119,10 @@ class ThermalMemory:
     """Memory of heat after a step.
 
     `heat` holds the waves of temperature, and `rise` is the map of the temperature rise of the surface [K]. `flash` is
-    the flash temperature and `highest` the highest rise of the surface [K]. `force` [N] is the force of the body and
-    `area` the contact area, both at the end of the step. `warmed` is True if heat has ever been released. The body
-    released the fraction `share` of the last heat, at the depths `depths`; the surface released the rest. `error` is
-    the relative error of friction, infinite if it is unknown.
+    the flash temperature and `highest` the highest rise of the surface [K]. `force` [N] is the tangential force due to
+    the body, and `area` the contact area, both at the end of the step. `warmed` is True if heat has ever been released.
+    The body released the fraction `share` of the last heat, at the depths `depths`; the surface released the rest.
+    `error` is the relative error of friction, infinite if it is unknown.
     """
 
     heat: HeatMemory
@@ -155,10 +156,11 @@ def feeds_back(job: Any) -> bool:
 
 
 class ThermalColumns(Effect[ThermalMemory]):
-    """The effect of heat. Its columns are the flash temperature, which is the mean temperature rise of the contact,
-    weighted by heat, the highest rise of the surface [K], and the relative error of the flash temperature.
+    """The effect of heat. It has three columns: the flash temperature [K], the highest temperature rise of the surface
+    [K], and the relative error of the flash temperature. The flash temperature is the mean temperature rise of the
+    contact, weighted by heat.
 
-    At rest the weights of the last sliding are used.
+    At rest the weights are those of the last sliding.
     """
 
     section: ClassVar[type[Part]] = Thermal
@@ -178,8 +180,8 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def curve_options(job: Any) -> Iterator[str]:
-        """Yield the options of a job for which friction curves have further columns (`Column.when`): thermal, and
-        feedback if it is on."""
+        """Yield the options of a job for which friction curves have further columns (`Column.when`): `thermal`, and
+        `feedback` if warm rubber relaxes faster."""
         yield from ("thermal", *["feedback"] * feeds_back(job))
 
     @staticmethod
@@ -189,7 +191,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Yield a sentence on the distance of steady sliding that is used if the job gives none."""
+        """Yield a sentence on the distance of steady sliding if the job gives no distance."""
         if job.section("thermal").distance is None:
             free = job.grid.boundary == "free"
             way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
@@ -272,8 +274,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:
-        """Return the flash temperature, the highest rise, and the relative error of the flash temperature, which
-        is ERROR times the error of friction; NaN if unknown."""
+        """Return the flash temperature [K], the highest rise [K], and the relative error of the flash temperature. This
+        error is ERROR times the error of friction, NaN if that error is unknown."""
         known = memory.flash != 0.0 and math.isfinite(memory.error)
         return memory.flash, memory.highest, ERROR * memory.error if known else math.nan
 
@@ -317,8 +319,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory that a checkpoint holds; collective. If the job now has shorter steps than the checkpoint,
-        it has further waves of temperature, and these start at 0."""
+        """Return the memory that a checkpoint holds; collective. If the job has shorter steps than the run that wrote
+        the checkpoint, the memory gets further waves of temperature, which start at 0."""
         per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

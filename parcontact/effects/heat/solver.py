@@ -20,12 +20,12 @@ the temperature is written as a sum of waves cos(m z) along the depth. The share
 
     g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3.                                         (3)
 
-Heat of the body then warms the depths at which it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` for a unit of
-heat, which replaces the factor 1/(kappa beta) of (1).
+A unit of heat of the body warms the depths at which it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm`. This
+replaces the factor 1/(kappa beta) of (1).
 
-A uniform heat has no steady state. After a sliding time t it has warmed a body that was cold by `2 q sqrt(t/pi)/e`,
-with the effusivity `e = kappa/sqrt(D)`; a wave has reached the share `erf(beta sqrt(D t))` of (1). For an infinite
-time, temperatures in a periodic box are relative to the mean of the box.
+A uniform heat has no steady state. After a sliding time t the body is warmer by `2 q sqrt(t/pi)/e` than at the start,
+with the effusivity `e = kappa/sqrt(D)`. The temperature of a wave is then the fraction `erf(beta sqrt(D t))` of (1).
+For an infinite time, temperatures in a periodic box are relative to the mean of the box.
 
 Time steps. The temperature is a sum of exponentials (`physics.prony`), whose terms j are waves along the depth with the
 rate m_j^2 and the weight w_j. The amplitude c of each wave j along the depth and k along the surface satisfies
@@ -104,11 +104,11 @@ class Conductor:
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths at which the body releases heat: waves of the `wavenumbers` [1/m] dissipate these `shares` of the heat,
-    both of shape (n,).
+    """Depths at which the body releases heat. Waves with the `wavenumbers` [1/m] dissipate the `shares` of the heat;
+    both arrays have the shape (n,).
 
-    Temperatures are integrals over waves cos(m z) along the depth, not (2): such integrals hold also for a finite time,
-    and for the temperature at a depth.
+    Temperatures are computed as integrals over waves cos(m z) along the depth. Unlike (2), these integrals hold also
+    for a finite time, and for the temperature at a depth.
     """
 
     wavenumbers: Array
@@ -116,14 +116,16 @@ class Depths:
 
     def cosines(self, m: Array) -> Array:
         """Return the share (3) of each wave cos(m z) along the depth, averaged over the dissipating waves with their
-        shares of the heat. `m` [1/m] has any length, shape (k,), as has the result."""
+        shares of the heat. `m` [1/m] and the result have the shape (k,)."""
         square = (0.5 * m / self.wavenumbers[:, None]) ** 2
         return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
 
     def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
-        """Return the temperature rise for a unit of heat, multiplied by the conductivity [m], to 1e-5. Heat has
-        diffused for a time t, given as `reach = D t` [m^2]. The rise is that at the depths where heat is released if
-        `felt`, else that of the surface. `beta` [1/m] is that of (1), in any shape."""
+        """Return the temperature rise for a unit of heat, multiplied by the conductivity [m], in the shape of `beta`.
+        The sum over waves is accurate to 1e-5. `beta` [1/m] is defined by (1). Heat has diffused for a time t, given as
+        `reach = D t` [m^2]. If `felt` is True, return the rise at the depths where heat is released, else the rise of
+        the surface.
+        """
         total = np.zeros_like(beta)
         for m, weight in zip(*self._waves(felt), strict=True):
             square = beta**2 + m**2
@@ -131,8 +133,9 @@ class Depths:
         return total
 
     def staying(self, tau: Array) -> Array:
-        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m]. This is how much the heat still warms the depths where it was
-        released, after diffusion over `tau = D t` [m^2]."""
+        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m]. This is the temperature to which a unit of heat still warms the
+        depths where it was released, after diffusion for a time t, given as `tau = D t` [m^2]. The shape is that of
+        `tau`."""
         total = np.zeros_like(tau)
         for m, weight in zip(*self._waves(True), strict=True):
             total += weight * np.exp(-(m**2) * tau)
@@ -234,7 +237,7 @@ class Heating:
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
     """Return the factors g_j of (4) for waves along the depth with these `rates` [1/s], averaged over the dissipating
-    waves; 1 for heat on the surface, without depths."""
+    waves. Without `depths` heat is released on the surface, and all factors are 1."""
     return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
@@ -247,8 +250,8 @@ class MeanMemory:
 
     @property
     def stored(self) -> float:
-        """Heat that the body has stored [J/m^2, mean over the box], the amplitude of the longest wave along the depth,
-        which never decays."""
+        """Heat that the body has stored [J/m^2, mean over the box]. It is the amplitude of the longest wave along the
+        depth, which never decays."""
         return float(self.waves[0])
 
     def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
@@ -284,8 +287,8 @@ class HeatMemory:
 
     def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
         """Set how heat is distributed at the beginning of the next step: on the surface in proportion to the map
-        `rubbed`, and in the body in proportion to the map `pressed`. `scales` are the factors by which both maps get
-        the mean 1."""
+        `rubbed`, and in the body in proportion to the map `pressed`. `scales` are factors: each map times its factor
+        has the mean 1."""
         if rubbed is not None:
             np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)
         np.multiply(self.fft.forward(pressed), scales[1], out=self.pressed)
@@ -297,8 +300,8 @@ class HeatMemory:
         rise [K] at the depths where the body releases heat, weighted by this heat.
 
         At the end of the step the heat on the surface is distributed like the map `rubbed`, and the heat in the body
-        like the map of which `pressed` is the spectrum (the buffer of the transform or a copy). `scales` are the
-        factors by which both maps get the mean 1.
+        like the map of which `pressed` is the spectrum (the buffer of the transform or a copy). `scales` are factors:
+        each map times its factor has the mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)
@@ -411,8 +414,9 @@ class Flash:
     """Temperature rises [K] of a contact where heat is released, on the surface and in the body, weighted by this heat.
 
     `mean` is the flash temperature, `lower` and `upper` are the quartiles, and `highest` is the highest rise on the
-    surface. In bands, `hottest_band` is the rise of the hottest band, else None. With feedback the temperatures are
-    found in `rounds` of steady states, the first of them for cold rubber: `friction_cold` is its friction.
+    surface. In bands, `hottest_band` is the rise of the hottest band; otherwise it is None. With feedback, `rounds`
+    steady states were solved to find the temperatures. The first of these states was for cold rubber, and
+    `friction_cold` is its friction coefficient.
     """
 
     mean: float = 0.0
@@ -451,7 +455,8 @@ def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: A
 
 def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
     """Return the temperatures of a contact; collective. `surface` is the map of the temperature rise of the surface
-    [K]. Each of the `pairs` is a map of a rise [K] and a map of the heat that is released where this rise is."""
+    [K]. Each of the `pairs` has a map of a temperature rise [K], and a map of the heat that is released at the same
+    depths."""
     sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
     warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
     highest = float(surface.max(initial=-math.inf))

@@ -99,8 +99,9 @@ def find_temperatures(
 
 
 class Feedback:
-    """Finds the flash temperature that a steady state reproduces. The first round is for cold rubber. If only the
-    velocity differs from that of the last state, the second round starts from the flash temperature of that state."""
+    """Search for the flash temperature with feedback: rubber that relaxes at this temperature is warmed to it by its
+    own heat. The first round is for cold rubber. If only the velocity differs from that of the last state, the second
+    round starts from the flash temperature of that state."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
@@ -110,10 +111,10 @@ class Feedback:
     ) -> Point:
         """Return the point `warmed(rise)` whose own flash temperature is `rise` [K].
 
-        Both agree within the relative `tolerance`, or within FINEST if it is smaller, or COARSEST if it is larger.
-        `speed` is in m/s, and `place` holds the mean pressure [Pa] and the temperature of the cold body [deg C]. No
-        rise above `most` [K] is tried, where the material's shift ends. Raises RunError if the flash temperature is
-        above `most`, or does not settle in MOST_ROUNDS rounds.
+        Both agree within the relative `tolerance`, which is limited to the range from FINEST to COARSEST. `speed` is in
+        m/s, and `place` holds the mean pressure [Pa] and the temperature of the cold body [deg C]. The material's shift
+        ends at the rise `most` [K], above which no rise is tried. Raises RunError if the flash temperature is above
+        `most`, or does not settle in MOST_ROUNDS rounds.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -196,8 +197,8 @@ def describe_cold_state(speed: float, pressure: float, temperature: float) -> st
 
 
 def beyond_shift(speed: float, pressure: float, temperature: float, most: float, rise: float) -> UnsolvedError:
-    """Return the error of a steady state that is warmer than the material's shift covers. The shift ends at the rise
-    `most` [K]; rubber that relaxes at this rise would be warmed by `rise` [K], which is more."""
+    """Return the error of a steady state that is warmer than the end of the material's shift. The shift ends at the
+    rise `most` [K]. The heat of rubber that relaxes at this rise would warm the rubber by `rise` [K], which is more."""
     return UnsolvedError(
         describe_cold_state(speed, pressure, temperature),
         f"the flash temperature is above {temperature + most:.4g} C, where the shift factors end; rubber of that "
@@ -279,8 +280,9 @@ def uniform(body: Conductor, m: Array, time: float) -> Array:
 
 
 def warming_factors(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Array:
-    """Return the factors of S_j(m) for all waves of a band j that has slid at `velocity` [m/s] for a `time` [s], each
-    multiplied by the number of waves that it stands for in a half spectrum; shape (m, waves)."""
+    """Return the factors of S_j(m) for all waves of a band j that has slid at `velocity` [m/s] for a `time` [s], shape
+    (m, waves). A half spectrum lacks waves: each factor is multiplied by the number of waves that its wave represents.
+    """
     fft, size = setup.fft, setup.grid.size
     square = body.squared_beta(fft, size, velocity)
     counts = (fft.multiplicity * (square.real > 0.0)).ravel()
@@ -368,9 +370,9 @@ def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
 class HeatOfBands:
     """The loop that finds the temperatures of bands.
 
-    With feedback each band relaxes at its own temperature. The temperatures change the friction of bands, whose heat
-    gives new temperatures: Aitken's relaxation finds the temperatures that do not change any more. The first round is
-    for cold rubber. No temperature above the range of the material's shift is tried.
+    With feedback each band relaxes at its own temperature. The temperatures change the friction and so the heat of the
+    bands, which gives new temperatures. Aitken's relaxation finds the temperatures that do not change any more. The
+    first round is for cold rubber. No temperature above the range of the material's shift is tried.
     """
 
     words: ClassVar[tuple[str, str]] = ("temperatures", "feedback: none")
@@ -390,8 +392,8 @@ class HeatOfBands:
             raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
 
     def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the bands have the rises that their heat causes, within an error. The rises stay 0 until all
-        loops before this one have settled for cold rubber. Arguments are as in
+        """Return True if the temperature rises of the bands agree, within an error, with the rises that their heat
+        causes. The rises stay 0 until all loops before this one have settled for cold rubber. Arguments are as in
         `bands.road_sliding.BandLoop.settles`."""
         rubbed = road.rub(results) * road.speed
         self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises
