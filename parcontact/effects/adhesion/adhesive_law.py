@@ -51,10 +51,11 @@ MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 @dataclass(frozen=True)
 class FreeInverse:
     """Inverse of the operator `free` of a free body, by conjugate gradients. The preconditioner is the inverse for the
-    `repeated`, periodic body, which has the same Green's function up to half the box: a dozen steps give five digits.
+    periodic body `repeated`. This body has the same Green's function up to half the box, so that a dozen steps give
+    five digits.
 
     The energy of the error is below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate
-    results. If `means` is False, the mean of a displacement is ignored, and pressures have the mean 0.
+    results. If `means` is False, the mean of a displacement is ignored, and pressures get the mean 0.
     """
 
     slab: Slab
@@ -103,8 +104,8 @@ LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of
 
 @dataclass
 class AdhesiveSolver:
-    """Solver of contacts with adhesion, by the solver `gaps` for a periodic body. `free` is the operator A of a free
-    body, and None for a periodic one."""
+    """Solver of contacts with adhesion. It uses the solver `gaps` for a periodic body. `free` is the operator A of a
+    free body; it is None if the body is periodic."""
 
     gaps: GapSolver
     workspace: Workspace
@@ -114,7 +115,8 @@ class AdhesiveSolver:
     def solve(
         self, problem: GapProblem, gap: Array, free_correction: Array | None, out: Array, loose: float = 1.0
     ) -> tuple[Contact, bool]:
-        """Solve from the map `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
+        """Solve, starting from the gap in the map `gap`. Put the solution into the same map, and the pressure into
+        `out`; collective.
 
         `free_correction` is `(A - B) p` of a free body and is updated. `loose` multiplies the tolerance. Return the
         contact, whose displacement is in the workspace, and True if the surfaces have detached.
@@ -218,8 +220,8 @@ LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area und
 
 
 class PastGap(NamedTuple):
-    """The map of the gap after a step, and the position of the surface [m]. `known` is False if the map has no gap yet,
-    as before the first step."""
+    """The map of the gap after a step, and the position of the surface [m]. `known` is False as long as the map
+    contains no gap, as before the first step."""
 
     gap: Array
     position: tuple[float, float] = (0.0, 0.0)
@@ -231,9 +233,10 @@ class AdhesiveMemory:
     """Memory of a contact with adhesion: maps of the gap.
 
     `pasts` are the gaps after the last two steps, the newest first. `spare` receives the gap of the next step, and
-    `gap_backup` the gap at the last equilibrium within this step.
-    `free_correction` is `(A - B) p` of the last solve for a free body, with the pressure `modulus p` (see the module);
-    it is None for a periodic body. `end` has time and load of the detachment, and is None before it.
+    `gap_backup` the gap at the last equilibrium within this step. `free_correction` is `(A - B) p` (see the module) of
+    the last solve of a free body; it is None for a periodic body. `modulus` is the modulus of that step, by which p is
+    multiplied to get the pressure. `end` holds the time and the load of the detachment; it is None as long as the
+    surfaces have not detached.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -246,10 +249,10 @@ class AdhesiveMemory:
 
 @dataclass(frozen=True)
 class LoadPath:
-    """Path of the prescribed load, an approach or a mean pressure, from the last step to the present one, in the run's
-    units for a body of modulus 1.
+    """Path of the prescribed load from the last step to the present step. The load is an approach or a mean pressure,
+    in the run's units for a body of modulus 1.
 
-    The load is `before` at the last step, and `control` at the present one. `approach` and `pressure` are the approach
+    The load is `before` at the last step, and `control` at the present step. `approach` and `pressure` are the approach
     and the mean pressure of the last step. `closes_gap_first` is True for a compressive load on detached surfaces: they
     are first moved together until they touch.
     """
@@ -385,9 +388,9 @@ class AdhesiveLaw:
     def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> EdgeMotion:
         """Return by how much the edges of contact have moved in a step, in half process zones.
 
-        This motion in cells is the number of points that entered or left the contact, divided by the length of its
-        edge, which is pi/4 of the number of cell sides along it. If the loads before and after the step are at most
-        errors of the solver, the step is `untouched`.
+        In cells, the motion is the number of points that entered or left the contact, divided by the length of the
+        edges. This length is pi/4 of the number of cell sides along the edges. The step is `untouched` if the loads
+        before and after the step are within the error of the solver.
         """
         least = LEAST_LOAD * self._attraction.strength
         separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
@@ -518,8 +521,8 @@ class AdhesiveLaw:
 
 
 def end_of(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment that a checkpoint holds; None if it holds none, if the job continues after
-    a detachment, or if the checkpoint belongs to a job with another history."""
+    """Return the time and the load of the detachment in a checkpoint. Return None if there was no detachment, if the
+    job continues after a detachment, or if the checkpoint belongs to a job with another history."""
     section = job.section("adhesion")
     return None if section is None or section.detached == "open" else end_in(job, saved)
 

@@ -26,14 +26,14 @@ The energies of a run are the work of the load, the energy of the attraction, an
 
 In a step the rigid surface does the work `F dd - F_t ds` along the path of its load, with the normal force F, the
 change dd of the approach, the tangential force F_t and the distance ds that it slides; the integral is taken by the
-trapezoidal rule. The gain is the increase of the energy of the body, including what it dissipates, and of the energy of
-the attraction. If the work exceeds the gain by more than the error of the rule can explain, the difference is lost in a
-snap. Otherwise the difference counts as an error, and the work is set to the gain.
+trapezoidal rule. The gain is the increase of the energies of the body and of the attraction, plus the energy that the
+body dissipates. If the work exceeds the gain by more than the error of the rule, the difference is lost in a snap.
+Otherwise the difference counts as an error, and the work is set to the gain.
 
 Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
-load in these states depends on inertia, which the model does not have. So the work in such a step is that up to the
-last equilibrium, or the gain if this is larger. The excess of the work over the gain is lost. While the surfaces are
-detached, neither work nor losses change.
+load in these states depends on inertia, which the model does not have. So the work in such a step is the work up to the
+last equilibrium, or the gain if the gain is larger. The excess of the work over the gain is lost. While the surfaces
+are detached, neither work nor losses change.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ class Adhesion(Part):
 
 @dataclass(frozen=True)
 class AdhesionLaw:
-    """Law of adhesion of a job: work [J/m^2], range [m] and kind, with E* of the relaxed body (`modulus` [Pa]) and the
-    longer side of a `cell` [m] among the directions with several points."""
+    """Law of adhesion of a job: the work of adhesion [J/m^2], the range [m], and the kind. `modulus` is E* of the
+    relaxed body [Pa]. `cell` is the longer side of a cell [m], where directions with a single point do not count."""
 
     work: float
     range: float
@@ -128,12 +128,13 @@ class AdhesionLaw:
         return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / abs(amplitude)
 
     def range_for(self, cells: float) -> float:
-        """Return the range [m] whose process zone is as long as a number of cells."""
+        """Return the range [m] for which the process zone is as long as this number of cells."""
         return math.sqrt(cells * self.cell * self.work / self.modulus)
 
 
 def adhesion_law(section: Adhesion, grid: Grid, material: Any) -> AdhesionLaw:
-    """Return the law of a section, for a grid and a material; a range `auto` is the smallest that the cells resolve."""
+    """Return the law of a section for a grid and a material. For a range `auto`, the law has the smallest range that
+    the cells resolve."""
     modulus = float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
     cell = max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)
     law = AdhesionLaw(section.work, math.nan, section.law, modulus, cell)
@@ -476,7 +477,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
         """Return the changes after a step: the energies and the columns. No errors are stated across a snap. A remark
-        warns once, if edges of contact of a viscoelastic body move so far in a step that rates are not resolved."""
+        warns once if edges of contact of a viscoelastic body move so far in a step that the rates of strain are not
+        resolved."""
         solved, energies = instant.solved, memory.energies
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:

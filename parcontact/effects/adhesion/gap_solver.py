@@ -16,8 +16,8 @@ energy of the uniform pressure m, with `d gamma/dg = -sigma`. The solve starts a
 every iteration, and no barrier is crossed deliberately, so that the history decides the branch. One iteration:
 
 1. The working set consists of open points (g > 0) and of points in contact under tension (c < 0).
-2. The residual is `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`.
-3. The direction is `t = z + beta t` (Polak and Ribiere), or `t = z` where that is no descent.
+2. The residual on the working set is `c = K (g + h) + m + sigma(g)`. The preconditioned residual is `z = A c`.
+3. The direction is `t = z + beta t` (Polak and Ribiere), or `t = z` if E does not fall along `z + beta t`.
 4. The change of the gap is `w = max(g - alpha t, 0) - g`, with the alpha that would have been best for the last step.
 5. The new gap is `g + theta w`. theta is Newton's step `-<c, w>/(<w, K w> - <w, (-sigma') w>)` if its denominator, the
    curvature of E along w, is clearly positive. Otherwise it is the majorized step `-<c, w>/<w, K w>`, which lowers E as
@@ -29,9 +29,10 @@ every iteration, and no barrier is crossed deliberately, so that the history dec
 An iteration applies two operators: A to c, which also gives the certificate, and K to w, which gives the change of the
 pressure, `theta K w`.
 
-Where the mean gap is given, c, z and t are centred, and w is scaled to keep this mean. V. Rey, G. Anciaux, J.-F.
-Molinari, Comput. Mech. 60 (2017) 69 use these gradients without a preconditioner; M. Bugnicourt, P. Sainsot, D.
-Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 use the working set. All numbers are dimensionless.
+If the mean gap is given, c, z and t get the mean 0, and w is scaled so that the mean gap does not change. V. Rey, G.
+Anciaux, J.-F. Molinari, Comput. Mech. 60 (2017) 69 use these gradients without a preconditioner; M. Bugnicourt, P.
+Sainsot, D. Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 use the working set. All numbers are
+dimensionless.
 
 The attraction sigma, its energy gamma and its slope follow from a `Law`. It has a `kind` (EXPONENTIAL or DUGDALE), a
 strength s, a range rho and a ramp r,
@@ -39,9 +40,9 @@ strength s, a range rho and a ramp r,
     exponential  sigma(g) = s exp(-g/rho),            gamma(g) = s rho exp(-g/rho),
     dugdale      sigma(g) = s ((rho - g)/r + 1/2), limited to 0..s, and -d gamma/dg = sigma.
 
-Over the ramp, at most 2 rho, a constant attraction falls to 0: in a cell where the gap rises by r it is the mean of
-the law without ramp, with the same energy gamma(0) = s rho. The exponential is the most expensive part of a loop, so
-energy and slope are computed from sigma.
+Over the ramp, of at most 2 rho, the attraction falls linearly from s to 0. This is the mean of the law without a ramp
+over a cell in which the gap rises by r. The energy gamma(0) = s rho is the same as without a ramp. The exponential is
+the most expensive part of a loop, so energy and slope are computed from sigma.
 
 In the loops, which run over the rows of this rank and return partial sums for one Allreduce, q is the pressure
 K (g + h), to which a mean is added.
@@ -108,7 +109,7 @@ def energy(law, g, sigma):
 
 @loop
 def softening(law, sigma):
-    """Return `-d sigma/dg`, by which the attraction falls with the gap, at the gap where the attraction is sigma."""
+    """Return `-d sigma/dg` at the gap where the attraction is sigma."""
     if law.kind == EXPONENTIAL:
         return sigma / law.range
     return law.strength / law.ramp if 0.0 < sigma < law.strength else 0.0
@@ -128,7 +129,7 @@ def attract(law, g, sigma):
 @loop
 def press(g, q, sigma, step, image):
     """Add `step image` to q, the pressure without its mean. Return the number of open points, and the sum of `q +
-    sigma` over them."""
+    sigma` over these points."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -309,9 +310,9 @@ LEAST_TRACTION = 1e-3  # load below which errors are not scaled by it, over the 
 class GapOperators(NamedTuple):
     """The operator A of a body, and its `inverse` K on fields of mean 0. K of a uniform field is 0.
 
-    `mean` is the displacement under a uniform pressure of 1, 0 if a uniform pressure does not move the surface;
-    `least_mean` is a positive number in its place where one is needed. Both are infinite if K is the inverse of A on
-    all fields.
+    `mean` is the displacement under a uniform pressure of 1. It is 0 if a uniform pressure does not move the surface.
+    Then `least_mean` is a positive number that replaces `mean` as a divisor; otherwise both are equal. Both are
+    infinite if K is the inverse of A on all fields.
     """
 
     operator: Operator
@@ -330,9 +331,9 @@ class GapProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class GapSolution:
-    """The solved `gap`, in the map of the start, and its pressure p, in a map of the solver that is valid until the
-    next solve. d is the approach.
+    """Solution of a problem: the gap, the pressure p, and the approach d.
 
+    `gap` is the map from which the solve started. `p` is a map of the solver, which is valid until the next solve.
     `failure` is empty, or states why the solve failed. `detached` is True if no equilibrium exists under the load, and
     `jumped` if the solve went through unstable states.
     """
@@ -352,9 +353,9 @@ class GapIterate:
     """The input of a solve, and numbers of its present iterate: the mean and the lowest gap, the uniform part m of the
     pressure, and the approach d.
 
-    `given` is the prescribed mean gap, or None. The last iteration went a `share` of its way; the whole way changes the
-    mean gap by `moved`, and the iteration changed m by `change`. `stable` is True after a Newton step. `step` is the
-    alpha (see the module) with which the next way is tried first.
+    `given` is the prescribed mean gap, or None. The last iteration made a `share` of its full step. The full step would
+    have changed the mean gap by `moved`. The iteration changed m by `change`. `stable` is True after a Newton step.
+    `step` is the first alpha (see the module) of the next iteration.
     """
 
     law: Law

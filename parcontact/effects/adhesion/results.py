@@ -1,20 +1,22 @@
 """Results of adhesion in texts and tables: the pull-offs of a run, from its rows. A pull-off is the largest tension
 before a contact detaches.
 
-The largest tension lies between steps. Let the load be higher than the lowest one by a in the row before it, which is
-earlier by the time s, and higher by b in the row after it, which is later by the time t. Then the vertex of the
-parabola through the three points is below the lowest load by
+The largest tension lies between steps. The row before the row of the lowest load is earlier by the time s, and its load
+is higher by a. The row after the row of the lowest load is later by the time t, and its load is higher by b. Then the
+vertex of the parabola through these three points is below the lowest load by
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
-The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, of
-PULL_OFF times the median relative mesh error of the contact area up to this row, and of ZONE times the fourth power of
-the side of a cell over the length of a process zone: cells of a zone or more hold the edge of contact. In tests,
-spheres were pulled off at seven rates with chosen steps, at accuracies from 0.1 to 0.005: all pull-offs differed from
-runs with 1500 equal steps by less than this error without the part of the mesh.
+The vertex is the load of the pull-off. The error of this load is the sum of four parts: e; SOLVER times the tolerance
+of the solves; PULL_OFF times the median relative mesh error of the contact area up to this row; and ZONE times the
+fourth power of the ratio of a cell's side to the length of the process zone. The last part is due to coarse cells,
+which hold the edge of contact in its place. In tests, spheres were pulled off at seven rates with chosen steps, at
+accuracies from 0.1 to 0.005: all pull-offs differed from runs with 1500 equal steps by less than this error without the
+part of the mesh.
 
 If the pull has no later row, if the contact snaps, or if it still exists at the end, the pull-off is the lowest load
-itself. Its error then has the difference between the lowest load and the load in the row before it in place of e.
+itself. Then the first part of the error is not e, but the difference between the lowest load and the load of the row
+before.
 """
 
 import math
@@ -46,10 +48,10 @@ Values = NDArray[np.float64]
 
 
 class PullOff(NamedTuple):
-    """A pull-off. `row` is the row of the lowest load. `pressure` is the load of the pull-off, and `between` the error
-    of this load by the steps, both as mean pressures [Pa]. `lost` is the first row without contact: the number of rows
-    if the run ended with the detachment, None if the contact still exists. `mesh` is the relative error of the load by
-    the mesh, NaN if unknown."""
+    """A pull-off. `row` is the row of the lowest load. `pressure` is the load of the pull-off, and `between` is the
+    error of this load by the steps; both are mean pressures [Pa]. `lost` is the first row without contact. It is the
+    number of rows if the run ended with the detachment, and None if the contact still exists. `mesh` is the relative
+    error of the load by the mesh, NaN if unknown."""
 
     row: int
     pressure: float
@@ -64,12 +66,14 @@ class PullOff(NamedTuple):
 
 def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> list[PullOff]:
     """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach`,
-    `contact_area` and `error_area`; `detached` is True if the run ended because its surfaces detached, and `coarseness`
-    is the side of a cell over the length of the process zone.
+    `contact_area` and `error_area`.
 
-    A pull is a range of rows in which the surfaces move apart. If contact is lost, the last such range before it
-    counts; otherwise the pull begins where the surfaces are closest. Rows after the loss of contact belong to the pull
-    as long as the surfaces move apart, since a lower load may follow there.
+    `detached` is True if the run ended because its surfaces detached. `coarseness` is the side of a cell divided by the
+    length of the process zone.
+
+    A pull is a range of rows in which the surfaces move apart. If contact is lost, the pull is the last such range
+    before the loss. Otherwise the pull begins where the surfaces are closest. Rows after the loss of contact belong to
+    the pull as long as the surfaces move apart, since a lower load may follow there.
     """
     names = "time", "pressure", "approach", "contact_area"
     time, pressure, approach, area = (np.asarray(columns[name], float) for name in names)
@@ -114,8 +118,9 @@ def _below(steps: Values, loads: Values) -> float:
 
 
 def describe_pull_off(pulls: Sequence[PullOff], columns: Columns, area: float, tolerance: float) -> Iterator[str]:
-    """Yield a sentence for each of the `pulls` of a run with these columns; a contact that still holds has a largest
-    pull. `area` is the area of the box [m^2], `tolerance` the tolerance of the solves."""
+    """Yield a sentence for each of the `pulls` of a run with these columns. For a contact that still exists the
+    sentence states the largest pull so far. `area` is the area of the box [m^2], `tolerance` the tolerance of the
+    solves."""
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
         time, approach = (columns[name][pull.row] for name in ("time", "approach"))
@@ -144,7 +149,7 @@ def _pulls(run: Results) -> list[PullOff]:
 
 
 def sentences(run: Results) -> Iterator[str]:
-    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds."""
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that still exists."""
     if run.job is not None and (pulls := _pulls(run)):
         yield from describe_pull_off(pulls, run.table, run.job.grid.lx * run.job.grid.ly, run.job.numerics.tolerance)
 
@@ -161,8 +166,8 @@ def headline(run: Results) -> Iterator[str]:
 
 
 def swept(run: Results) -> Iterator[tuple[str, float]]:
-    """Yield names and values of a case's last pull-off: force and error [N], approach [m]; none if the contact
-    holds."""
+    """Yield names and values of a case's last pull-off: the force and its error [N], and the approach [m]. Yield
+    nothing if the contact still exists."""
     lost = [each for each in _pulls(run) if each.lost is not None]
     if run.job is not None and lost:
         area, pull = run.job.grid.lx * run.job.grid.ly, lost[-1]
