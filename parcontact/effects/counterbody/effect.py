@@ -61,8 +61,9 @@ def _at(zero: Zero, body: Prony, moduli: Array, whole: Prony) -> float:
 
 
 class Counterbody(Part):
-    """The rough body if it deforms, too: all that the section `material` may contain, such as `{model: elastic,
-    shear_modulus: 5.0e6}` or `{include: NAME}`. Without this section the rough body is rigid ({doc}`limits`)."""
+    """The `counterbody` section: the material of a rough body that deforms, with the keys of the section `material`,
+    such as `{model: elastic, shear_modulus: 5.0e6}` or `{include: NAME}`. Without this section the rough body is rigid
+    ({doc}`limits`)."""
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -72,8 +73,9 @@ class Counterbody(Part):
 class Pair(Zener):
     """A rubber and its counterbody as one body, with Poisson's ratio, hardness, shift and measured range of the rubber.
 
-    Each body is shifted to its temperature before both are joined. The base class shifts `branches` and `modulus_inf`
-    by the factors of the rubber, so that these keys hold the series of the pair divided by these factors.
+    Each body is shifted to its temperature before both are joined. The base class multiplies `branches` and
+    `modulus_inf` by the shift factors of the rubber. So these keys hold the series of the pair divided by these
+    factors.
     """
 
     _first: AnyMaterial = PrivateAttr()
@@ -82,9 +84,9 @@ class Pair(Zener):
 
     @classmethod
     def of(cls, first: AnyMaterial, second: AnyMaterial, relaxed: bool) -> Pair:
-        """Return two bodies as one. The moduli of the second body are multiplied by the ratio of 1 - nu of the first to
-        that of the second: then the compliances (1 - nu)/G of both add up. If `relaxed` is True, the second body is
-        elastic with its long-term modulus."""
+        """Return two bodies as one. The moduli of the second body are multiplied by `(1 - nu_1)/(1 - nu_2)`, with the
+        Poisson ratios of both bodies. Then the compliances (1 - nu)/G of both bodies add up. If `relaxed` is True, the
+        second body is elastic with its long-term modulus."""
         own, scale = first.fitted, (1.0 - first.poisson) / (1.0 - second.poisson)
         other = Prony(second.fitted.long_modulus, np.zeros(0), np.zeros(0)) if relaxed else relaxation_of(second)
         both = pair(relaxation_of(first), (scale * other.modulus_inf, scale * other.moduli, other.relaxation_times))
@@ -178,7 +180,7 @@ class CounterbodyThatDeforms(Effect[None]):
     @staticmethod
     def changed_material(job: Any) -> Any:
         """Return the pair of both bodies, which replaces the material. For steady sliding the counterbody has its
-        long-term modulus, as it carries the roughness and sees a load at rest."""
+        long-term modulus: it carries the roughness, so that its load does not change with time."""
         relaxed = _has_relaxed(job)
         if isinstance(job.material, Pair) or (relaxed and job.counterbody.fitted.long_modulus == 0.0):  # refused
             return job.material
