@@ -1,4 +1,5 @@
-"""The `interface` section of a job, friction of the contact area itself (`physics.surface`), and its effects."""
+"""The `interface` section of a job, which gives the friction of the contact area itself (`physics.surface`), and the
+effects that add this friction."""
 
 from __future__ import annotations
 
@@ -164,9 +165,9 @@ class InterfaceEffect(Effect[Memory]):
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
     """Return the two parts of the friction coefficient, due to the body and due to the interface: the components of
-    both forces along the total force, divided by the normal force. The force of the interface opposes a `velocity`, of
-    any size. A part is negative if its force opposes the total force, as the force of the interface may after a
-    reversal."""
+    both forces along the total force, divided by the normal force. The force of the interface opposes the vector
+    `velocity`, whose length does not matter. A part is negative if its force opposes the total force, as the force of
+    the interface may after a reversal."""
     scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
     along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
     own = 0.0 + along * measures.friction_interface  # not -0
