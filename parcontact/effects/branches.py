@@ -69,8 +69,8 @@ def time_factor_of(material: Material) -> float:
 
 
 def temperature_of(material: Material) -> float:
-    """Return the temperature of a material [deg C], by default its shift's reference temperature; NaN without a
-    shift."""
+    """Return the temperature of a material [deg C]. If the material gives none, return the reference temperature of its
+    shift; NaN without a shift."""
     body = material.fitted
     if not isinstance(body, job.Zener) or body.shift is None:
         return math.nan
@@ -119,9 +119,10 @@ class FoldedBranches:
     """The branches of a material that have a map (`kept`), and those that have none (`memoryless`, `frozen`), by their
     numbers in the material.
 
-    All branches without a map together cause a relative error of at most `bound`, of friction if the surface slides,
-    else of the modulus; `bound` is at most `allowed`. `memoryless_errors` are the errors that each branch would cause
-    if it were memoryless. If all branches need maps, `reason` states why, else it is ''.
+    All branches without a map together cause a relative error of at most `bound`, which is at most `allowed`. This is
+    an error of friction if the surface slides, else an error of the modulus. `memoryless_errors` are the errors that
+    each branch would cause if it were memoryless. `reason` states why all branches need maps; it is '' if some need
+    none.
     """
 
     kept: tuple[int, ...]
@@ -143,9 +144,9 @@ def fold_branches(
 ) -> FoldedBranches:
     """Return which branches of a material have maps.
 
-    If there is a `reason`, all have maps. Otherwise the fastest branches are memoryless and the slowest are frozen, as
-    many of them as possible while the sum of their errors is at most `allowed`. Moduli are in Pa, and relaxation times,
-    in s, rise and differ (`physics.prony.normal_form`).
+    If a `reason` is given, all branches have maps. Otherwise the fastest branches are memoryless and the slowest are
+    frozen, as many of them as possible while the sum of their errors is at most `allowed`. `prony` has moduli in Pa and
+    relaxation times in s. The relaxation times rise, and no two are equal (`physics.prony.normal_form`).
     """
     without_memory, as_spring = memoryless_errors(prony, scales, integrator), frozen_errors(prony, scales)
     fast = (np.cumsum(without_memory) <= MEMORYLESS_SHARE * allowed) & (not reason)
@@ -190,8 +191,8 @@ def bounded_error(found: FoldedBranches, slides: bool) -> str:
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony, slides: bool) -> list[str]:
-    """Return sentences on the branches of a material that have no map. The list is empty if all have maps and no reason
-    is to be stated. `prony` has relaxation times in s, and `slides` is True if the surface moves."""
+    """Return sentences on the branches of a material that have no map. The list is empty if all branches have maps and
+    `found` states no reason for this. `prony` has relaxation times in s, and `slides` is True if the surface moves."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []

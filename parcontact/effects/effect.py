@@ -1,12 +1,12 @@
 """Interfaces that an effect and a contact law implement.
 
-An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to it. From the
-job alone it decides whether it is on, and states which columns, maps and memory it then adds. It is called after each
-step, and may provide the contact law.
+An effect is one class. The program finds the class by the section that the effect adds to a job (`job.listing`); no
+other file refers to the class. The class decides from the job alone whether the effect acts, and states the columns,
+maps and memory that the effect adds. The effect is called after each step, and may provide the contact law.
 
 `ContactLaw` is the interface to a contact law in a march: the solution of a step, the memory of the law, and where
-surfaces touch in saved maps. If no effect provides a law, the law only bounds the pressure (`march.laws`). In the law
-of an effect the gap may be the unknown.
+surfaces touch in saved maps. If no effect provides a law, the law only bounds the pressure (`march.laws`). A law of an
+effect may have the gap as its unknown instead of the pressure.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class PreviousPressure(NamedTuple):
     """The pressure after a step, and the position of the surface [m] at that time.
 
     The pressure is `alpha` times the map `pressure`, in the run's unit of pressure. `alpha` is the modulus of the body
-    in that step; 0 means that the pressure is not known.
+    in that step. It is 0 if the pressure is not known.
     """
 
     pressure: Array
@@ -75,9 +75,9 @@ class SolvedContact(Generic[Remembered]):
     """The solution of a step: the contact, the memory of the law after the step, and a map `touching`, which is not 0
     where the surfaces touch.
 
-    `numbers` are further results of the law, by their names. `pull` is the force of all tension [N]. Loads of at most
-    `least_load` [N] may be errors of the solver. `snapped` is True if the contact passed through states
-    without equilibrium. `remark` is a sentence for run.log, or ''. `end` is one of
+    `numbers` are further results of the law by name. `pull` is the force of all tension [N]. A load of at most
+    `least_load` [N] is not distinguished from 0, as it may be an error of the solver. `snapped` is True if the contact
+    passed through states without equilibrium. `remark` is a sentence for run.log, or ''. `end` is one of
 
     * "equilibrium";
     * "detached": the surfaces separated, since no equilibrium in contact was left;
@@ -106,7 +106,7 @@ class EdgeMotion(NamedTuple):
 
     `front` is the distance by which the edges of contact moved, divided by half the length of the zone in which
     surfaces separate. `untouched` is True if nothing touches or is under tension, neither before nor after the step.
-    `begins` is True if surfaces that attract each other touch either before or after the step, but not both.
+    `begins` is True if surfaces that attract each other come into contact, or lose contact, in the step.
     """
 
     front: float = 0.0
@@ -148,8 +148,8 @@ UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}
 
 
 def nothing_holds(control: str, load: float) -> str:
-    """Return a sentence that reports the load under which the surfaces detach: `control` is pressure, force or
-    approach, and `load` is its value in SI units."""
+    """Return a sentence that states the load under which the surfaces detach. `control` names the kind of load:
+    pressure, force or approach. `load` is its value in SI units."""
     return f"the surfaces detach under a {control} of {load:g}{UNITS_OF_LOADS[control]}"
 
 
@@ -209,7 +209,7 @@ SINGLE, BY_THEORY = "single precision", "Persson's theory"
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision about the effect called `name`: True in `on` if it acts, and the reason `why` in a few words."""
+    """Decision whether the effect `name` acts: `on` is True if it acts, and `why` is the reason in a few words."""
 
     name: str
     on: bool
@@ -221,11 +221,11 @@ class Sheared:
     """Results of tractions along the surface in a step.
 
     `measures` are the measures of the step including tractions. `force` [N] is the force of all tractions on the rigid
-    surface, and `lost` [J] the energy lost in slip. The map `slipping` says where heat of slip is released: it is
-    proportional to the power of slip, or, if nothing slips, to the largest traction that the interface can bear.
+    surface, and `lost` [J] the energy lost in slip. The map `slipping` is proportional to the heat that slip releases
+    at each point. If nothing slips, the map is proportional to the largest traction that the interface can bear.
 
-    The last four numbers are relative errors of tractions, and a share: `error` comes from their solve, `time` from the
-    length of the step, and `mesh` from the stiffness of contact spots. The error of the contact area affects only the
+    Three numbers are relative errors of the tractions: `error` is due to the solve, `time` to the length of the step,
+    and `mesh` to the stiffness of contact spots on the mesh. The error of the contact area affects only the fraction
     `share` of the tractions.
     """
 
@@ -246,9 +246,9 @@ class Instant:
 
     The pressure is the number `modulus` times the map `pressure`. `displacement` is the displacement of the body, and
     `touching` is not 0 where the surfaces touch. `before` are the measures before the step, and `measures` those after
-    it. In the step the surface moved by the vector `moved` [m], and the sum of the stored and the dissipated energy of
-    the body changed by `gained` [J], which is NaN if energies are not computed. `front` and `untouched` are those of
-    `EdgeMotion`. `error_friction` is the estimated relative error of friction, infinite without friction.
+    it. In the step the surface moved by the vector `moved` [m]. `gained` [J] is the change of the sum of stored and
+    dissipated energy of the body, NaN if energies are not computed. `front` and `untouched` are as in `EdgeMotion`.
+    `error_friction` is the estimated relative error of friction, infinite without friction.
     """
 
     step: Step
@@ -284,9 +284,9 @@ class Instant:
 class Changes(Generic[Remembered]):
     """Changes that an effect makes in a step.
 
-    `memory` is its memory after the step, and `remark` a sentence for run.log, or ''. `states_errors` is False if
-    errors cannot be stated across this step. `turned` is the change of the mean traction, divided by the mean of the
-    largest traction that the interface can bear.
+    `memory` is the memory of the effect after the step, and `remark` is a sentence for run.log, or ''. `states_errors`
+    is False if errors cannot be stated across this step. `turned` is the change of the mean traction, divided by the
+    mean over the contact of the largest traction that the interface can bear.
     """
 
     memory: Remembered
@@ -331,14 +331,14 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Return the decision whether the job turns the effect on. Its `name` is the effect's name in checkpoints. All
-        ranks must return the same."""
+        """Return the decision whether the job turns the effect on. The `name` of the decision is the effect's name in
+        checkpoints. All ranks must return the same."""
         ...
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the maps that the effect stores in checkpoints and in memory. `parcontact plan` uses them
-        for effects of other packages; for effects of this package it counts allocations."""
+        """Return the types of the maps that the effect stores in checkpoints and in memory. `parcontact plan` uses
+        these types for effects of other packages. For effects of this package, the plan counts allocations instead."""
         return ()
 
     @staticmethod
@@ -435,8 +435,8 @@ class Effect(Protocol[Memory]):
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
-        """Return energies and losses that the energies of the body under pressure do not contain: energies of the body,
-        in the unit of the scene, and work lost outside the body [J]. Return None if the effect adds nothing."""
+        """Return what the effect adds to the energies of the body under pressure: further energies of the body, in the
+        unit of the scene, and the work that is lost outside the body [J]. Return None if the effect adds nothing."""
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
@@ -473,8 +473,8 @@ class _NamedLaw:
 
 
 def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
-    """Return an effect's class with checks: errors in an effect of another package name the effect, and maps of an
-    instant are read-only for it."""
+    """Return the class of an effect, with checks if another package has registered it: errors name the effect, and the
+    effect cannot change the maps of an instant."""
     if listing.is_ours(section):
         return effect
 
