@@ -50,8 +50,9 @@ def _entries(block: str) -> Iterator[str]:
         found: Any = pydoc.locate(name)
         yield f"## {_short(name)}{_parameters(found)}\n\n{inspect.getdoc(found)}"
         named = [member.strip() for member in members.split(",") if member.strip()]
-        all_of = members == "" and f"{name}\n   :members:" in block
-        for member in named or (_public(found) if all_of else ()):
+        if not named and members == "" and f"{name}\n   :members:" in block:
+            named = [name for name, value in vars(found).items() if not name.startswith("_") and inspect.getdoc(value)]
+        for member in named:
             value = inspect.getattr_static(found, member)
             yield f"### {member}{_parameters(getattr(value, '__func__', value))}\n\n{inspect.getdoc(value)}"
 
@@ -65,10 +66,6 @@ def _first_sentence(name: str) -> str:
     """Return the beginning of a docstring, as far as a line of a terminal has room for it."""
     text = re.split(r"(?<=[.:;]) ", " ".join((inspect.getdoc(pydoc.locate(name)) or "").split()))[0]
     return textwrap.shorten(text.rstrip(".:;"), ROOM, placeholder=" ...")
-
-
-def _public(kind: type) -> list[str]:
-    return [name for name, value in vars(kind).items() if not name.startswith("_") and inspect.getdoc(value)]
 
 
 def _parameters(found: Any) -> str:

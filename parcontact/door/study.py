@@ -112,12 +112,6 @@ class Ladders:
         return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
 
 
-def _cells_of_time_steps(job: Job) -> float:
-    """Return the cells per step of the first sliding stage with a given time step; 1 without one."""
-    steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
-    return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
-
-
 def _has_time_steps(job: Job) -> bool:
     """Return True if a stage slides or has a given time step, so that a study can refine its steps."""
     return any(stage.speed or stage.time_step not in (None, AUTO) for stage in job.history)
@@ -132,7 +126,8 @@ def ladders(job: Job) -> Ladders:
         raise InputError("study.cells_per_step: no stage slides or has a time step; leave it out")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
     if own is None and not _sliding(job) and _has_time_steps(job):
-        own = _cells_of_time_steps(job)
+        steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
+        own = next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
     if own is None and study.cells_per_step:
         own = 1.0
     case = Settings(job.grid.nx, own, numerics.integrator)

@@ -110,6 +110,11 @@ def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str,
         hdf5.put(part, {f"{SUMS}/{name}": np.concatenate([sums[name] for sums in everyone]) for name in maps})
         _seal(part)
 
+    def publish() -> None:
+        files.make_room(path, is_one)
+        part.replace(path)
+        hdf5.sync_one(path.parent)
+
     try:
         size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
         hdf5.lay_out(part, slab, build, size, SEAL)
@@ -117,7 +122,7 @@ def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str,
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.write_on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)
-        hdf5.write_on_root(slab, lambda: _publish(part, path), f"cannot create {path}")
+        hdf5.write_on_root(slab, publish, f"cannot create {path}")
     except RunError:
         if slab.root:
             with suppress(OSError):
@@ -127,12 +132,6 @@ def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str,
 
 def _maps(entries: Mapping[str, Entry]) -> dict[str, Array]:
     return {name: np.asarray(entry.value) for name, entry in entries.items() if entry.is_map}
-
-
-def _publish(part: Path, path: Path) -> None:
-    files.make_room(path, is_one)
-    part.replace(path)
-    hdf5.sync_one(path.parent)
 
 
 def row_sums(rows: Array) -> NDArray[np.uint32]:

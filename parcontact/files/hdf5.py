@@ -65,14 +65,11 @@ def open_results(path: Path) -> h5py.File:
     except FAILURES as error:
         raise InputError(f"{path} cannot be read: {reason(error)}; {MEND}") from error
     for name in file:
-        if isinstance(file.get(name, getlink=True), h5py.ExternalLink) or _has_outside_data(file[name]):
+        outside = isinstance(file.get(name, getlink=True), h5py.ExternalLink)
+        if outside or (isinstance(item := file[name], h5py.Dataset) and (item.is_virtual or item.external is not None)):
             file.close()
             raise InputError(f"{path}: {name} is a link to another file, which is not followed; copy it into this file")
     return file
-
-
-def _has_outside_data(item: Any) -> bool:
-    return isinstance(item, h5py.Dataset) and (item.is_virtual or item.external is not None)
 
 
 def sync(path: Path, slab: Slab) -> None:

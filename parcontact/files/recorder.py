@@ -281,12 +281,6 @@ class Recording:
     every: int = 1
     open_ended: bool = False
 
-    @property
-    def map_steps(self) -> list[int]:
-        """Return the steps after which maps are saved, as far as known."""
-        last = set[int]() if self.open_ended else {self.total}
-        return sorted({*range(self.every, self.total + 1, self.every), *last})
-
 
 class Recorder:
     """Writes the outputs of every step; the constructor and all methods but `close` are collective.
@@ -326,7 +320,9 @@ class Recorder:
             if saved is not None:
                 self.warnings += filter(None, [fields.cut_back(path, self.slab, saved.step)])
             return None
-        file = FieldsFile(path, self.slab, recording.size, recording.maps, recording.map_steps)
+        last = set[int]() if recording.open_ended else {recording.total}  # steps after which maps are saved, if known
+        steps = sorted({*range(recording.every, recording.total + 1, recording.every), *last})
+        file = FieldsFile(path, self.slab, recording.size, recording.maps, steps)
         if saved is None:
             file.make(provenance)
         else:

@@ -61,11 +61,6 @@ class PlottedRun(Results):
         return to_load(self.columns["pressure"], self.area * self.free)
 
     @property
-    def in_contact(self) -> tuple[Axis, Array]:
-        """Return the axis and the values of the contact area with the correction at the edges of contact."""
-        return to_contact_area(self.columns["contact_area_corrected"], self.area * self.free)
-
-    @property
     def backwards(self) -> bool:
         """Return True if the surface moves along x only and reverses; the magnitude of friction would then have a
         cusp."""
@@ -321,7 +316,8 @@ def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
     """Yield the panels of a run that show anything, those of columns first."""
     signed = run.backwards and not along.marked  # the axis of speed has no direction
     columns = dict(run.columns)
-    (load_axis, columns["load"]), (area_axis, columns["area"]) = run.load, run.in_contact
+    load_axis, columns["load"] = run.load
+    area_axis, columns["area"] = to_contact_area(columns["contact_area_corrected"], run.area * run.free)
     columns["approach"] = np.where(columns["load"] != 0.0, columns["approach"], np.nan)
     friction = Axis("friction coefficient" + "\nalong x" * signed), {"": "friction_x" if signed else "friction"}
     first = ColumnPanel("friction", *friction), ColumnPanel("area", area_axis, {"": "area"})

@@ -217,7 +217,8 @@ def _width(figure: Figure | SubFigure) -> float:
 
 def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
     """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
-    width = _width(axes.figure) / panels_per_row(axes)
+    place = axes.get_subplotspec()
+    width = _width(axes.figure) / (place.get_gridspec().ncols if place else 1)
     if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
         axes.legend(entries.values(), entries)
         return 0.0
@@ -233,12 +234,6 @@ def _add_below(owner: Axes | Figure | SubFigure, entries: dict[str, Artist], wid
     columns = max(1, min(len(names), int(width / (ROOM + LETTER * longest))))
     legend = owner.legend(entries.values(), names, ncols=columns, columnspacing=1.0, **place)
     return float(legend.get_window_extent().height / legend.figure.dpi) + GAP
-
-
-def panels_per_row(axes: Axes) -> int:
-    """Return the number of panels in the row to which a panel belongs."""
-    place = axes.get_subplotspec()
-    return place.get_gridspec().ncols if place else 1
 
 
 MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
