@@ -1,42 +1,46 @@
 """The error budget: estimated errors of friction and contact area by source, of one step and of a whole run.
 
 The errors of all sources are added. They are calibrated estimates that hold in nearly all scenes; a true error may be
-much smaller. Each source estimates a relative error from numbers of a step, with constants fitted to true errors
-(`time_error.Fit`). N is the number of spots of contact, and c is the relative excess of the counted area over
-the corrected one.
+much smaller. The error of each source follows from numbers of a step and from constants fitted to true errors
+(`time_error.Fit`). Below, N is the number of spots of contact, and c is the relative excess of the counted area over
+the corrected area. Names in capitals are constants of this module.
 
-solver: the error of friction is proportional to the `complementarity` C of the certificate (`physics.records`), and
-divided by N^(1/4), as errors of many spots average out. Where friction is far below the slopes, it is a small
-difference of large forces. Errors of pressures then count more, by the root of the ratio, and they cause a tangential
-force of up to NOISE C times the rms slope, relative to the load. Friction by energy is a sum of squares. As pressures
-are rounded to single precision, with the relative rounding SINGLE, it is not known below the square of SINGLE. The
-error of the area is the share of points that penetrate without pressure, plus a small error that varies as C^0.7.
+Source `solver`. The error of friction is proportional to the `complementarity` C of the certificate
+(`physics.records`). As errors of many spots average out, this error is divided by N^(1/4). If friction is far below the
+rms slope, friction is a small difference of large forces. The error is then multiplied by the root of the ratio of
+slope to friction. It is at least NOISE C/N^(1/2) times this ratio, as errors of pressures cause a tangential force also
+without friction. In steady sliding friction is a sum of squares. Its absolute error is at least the square of SINGLE,
+as pressures are rounded to single precision there. The error of the area is proportional to the share of points that
+penetrate without pressure, plus a small error that varies as C^0.7.
 
-time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded pair
-(`time_error`). folded: the bound on the errors of friction by the branches without a map; the error of the area is this
-bound times the share of the box that is not in contact.
+Source `time`. The error of friction follows from the distance by which spots of contact, or waves of the surface, pass
+in a step, and from the embedded pair (`time_error`).
 
-mesh: the error of the area is AREA c/N^(1/4) while the surface slides, as errors of its positions average out, and
-STILL c/N^(1/4) at rest and in steady sliding; it is at least the area of one cell. For friction in a march, VIEWS times
-the difference between friction by the slopes of the rigid surface and by the slopes of the body. For steady friction, a
-sum of squares without cancellation, the loss at edges in waves shorter than the cells, and STEADY_AREA c/N^(1/4).
-Identical contacts have the same position on the grid: their errors do not average out (N = 1), and are IDENTICAL times
-as large for the area and for steady friction. Edges along an axis of the grid also have one position: if all edges
-follow the axis, errors are also IDENTICAL times as large; if a share does, they grow in proportion to this share. A map
-lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction WAVES (4/cells)^2.5.
+Source `folded`. The error of friction is the bound on the effect of the branches without a map. The error of the area
+is this bound times the share of the box that is not in contact.
 
-Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
-waves of wavenumber q across the edge falls as q^-3. In steady sliding at the speed v these waves lose power in
-proportion to q^-3 sin delta(q v), with the loss angle delta of the body at their frequency q v. For Hertzian contacts
-of a body whose loss angle grows with the frequency, all waves together lose as much as this law gives for all
-wavenumbers above q0: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the
-integrals of J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in
-shorter waves is
+Source `mesh`. The error of the area is AREA c/N^(1/4) while the surface slides, and STILL c/N^(1/4) at rest and in
+steady sliding. The smallest error of the area is the area of one cell. The error of friction in a march is VIEWS times
+the difference between friction by the slopes of the rigid surface and friction by the slopes of the body. In steady
+sliding, where friction is a sum of squares without cancellation, the error is the loss at edges in waves shorter than
+the cells, plus STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid. Their errors do not
+average out, so that N = 1, and are IDENTICAL times as large for the area and for steady friction. Errors also grow if
+edges of contact follow an axis of the grid: by the factor IDENTICAL if all edges do, and less, in proportion, if some
+edges do. On a grid with less than FEW_CELLS cells per shortest wave, a map lacks waves. This adds the error WAVES
+(4/cells)^2.5 to friction, with the number of cells per shortest wave.
+
+Loss at edges: the pressure rises from an edge of contact as the root of the distance. The mean square of its waves of
+wavenumber q across the edge therefore falls as q^-3. In steady sliding at the speed v these waves lose power in
+proportion to q^-3 sin delta(q v), with the loss angle delta of the body at the frequency q v. In Hertzian contacts of a
+body whose loss angle grows with the frequency, all waves together lose as much as this law gives for all wavenumbers
+above q0. Here q0 = 2/(pi a) for a strip of half width a and q0 = 3/(pi a) for a circle of radius a, from the integrals
+of J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves
+is
 
     s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q.
 
-Far below the relaxation frequencies of the body m is 1, and the share is of first order in the cell; far above m is
-s^2.
+Far below the relaxation frequencies of the body, m is 1, and the share is of first order in the length of the cells.
+Far above them, m is s^2.
 """
 
 import math
@@ -109,8 +113,8 @@ class ErrorPair:
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """A source of error: its name, a remedy, and the function `error`, which returns the relative errors of friction
-    and area that the source causes in a step."""
+    """A source of error: its name, a remedy, and the function `error`. This function returns the relative errors of
+    friction and area that the source causes in a step."""
 
     name: str
     remedy: str
@@ -127,7 +131,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors that the solve of a state of steady sliding causes; its friction is a sum of squares."""
+    """Return the errors that the solve of a state of steady sliding causes. Friction is then a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
     friction = max(friction, SINGLE**2 / observed.body if observed.body else 0.0)
     return ErrorPair(friction, _solver_of_area(observed))
@@ -139,7 +143,7 @@ def _solver_of_area(observed: StepObservation) -> float:
 
 def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors that the length of a step causes, including a rise of friction within the step. If the body
-    states its own error, the area has this error, too."""
+    computes the error of its own step, this is the error of friction and of the area."""
     error = time_error(run, observed)
     if observed.own_error is not None:
         return ErrorPair(error, error)
@@ -185,8 +189,8 @@ def _grow_if_coherent(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
-    """Return an upper bound on the share of friction that is missing because the grid lacks waves at edges of contact
-    that are shorter than its cells; 0 at rest, and for an elastic body."""
+    """Return an upper bound on the share of friction that the grid misses. At edges of contact there are waves shorter
+    than the cells of the grid, whose loss is missing. Return 0 at rest and for an elastic body."""
     if run.prony is None or not any(observed.way):
         return 0.0
     cell = cell_along(run, observed.way)
@@ -198,8 +202,12 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
-    """Return s and s m of the module for round spots with a `radius` in cells that slide by `speed` cells per second;
-    for strips of this half width if `edges_follow_grid`. Both are at most 1, and 0 without edges or losses."""
+    """Return s and s m, the shares of the loss in the module's docstring, for round spots of contact that slide.
+
+    `radius` is the radius of the spots in cells, and `speed` the number of cells that they slide per second. If
+    `edges_follow_grid`, the spots are strips, and `radius` is their half width. Both results are at most 1. Both are 0
+    if there are no edges or no losses.
+    """
     if radius == math.inf or not prony.moduli.size:
         return 0.0, 0.0
     first = (STRIP if edges_follow_grid else CIRCLE) / radius if radius > 0.0 else math.inf
@@ -243,8 +251,8 @@ SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
 
 
 class ErrorParts(NamedTuple):
-    """Relative errors by source. For surfaces in bands, `method` is the error of their coupling, and `scatter` the
-    variation between surfaces with the same spectrum."""
+    """Relative errors by source. For surfaces in bands, `method` is the error of the coupling of bands, and `scatter`
+    is the variation between surfaces with the same spectrum."""
 
     solver: float
     time: float
@@ -259,8 +267,8 @@ class ErrorParts(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The stated relative error of friction. If the sum of the parts exceeds UNKNOWN, it is at least 1: friction is
-        then a small difference of large forces, and only the order of magnitude of its error is known."""
+        """The stated relative error of friction: the sum of the parts, but at least 1 if the sum exceeds UNKNOWN.
+        Friction is then a small difference of large forces, and only the order of magnitude of its error is known."""
         return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     def plain(self) -> dict[str, float]:
@@ -273,9 +281,9 @@ NAMES = ErrorParts._fields
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Errors at one instant. `friction` has the relative errors of friction, in sum possibly above 1, and is
-    None without friction; `area` has the relative errors of the area. No errors are stated unless
-    the mesh is `resolved`: spots of contact have more than a few cells."""
+    """Errors at one instant. `friction` states the relative errors of friction by source, whose sum may exceed 1; it is
+    None without friction. `area` states the relative errors of the contact area. If `resolved` is False, spots of
+    contact may be smaller than a few cells, and no errors are stated."""
 
     friction: ErrorParts | None
     area: ErrorParts
@@ -287,8 +295,8 @@ class ErrorBudget:
         return replace(self, friction=friction)
 
     def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
-        """Return the budget with further relative errors of friction and area, which the last round of a fixed point
-        shows, added to the part of the solver."""
+        """Return the budget with further relative errors of friction and area, which are added to the errors of the
+        solver. They are the changes in the last round of a fixed point."""
         own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
         return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
 
@@ -321,10 +329,10 @@ def add_shear(
     budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float, mesh: float
 ) -> ErrorBudget:
     """Return the error budget of a friction coefficient `whole` that is the sum of two parts: `body`, whose errors are
-    in `budget`, and `shear` by tractions.
+    in `budget`, and `shear`, which tractions cause.
 
-    The tractions have the relative errors `solver` of their solve, `time` of the step and `mesh` of the stiffness of
-    spots; a `share` of the tractions has the error of the area.
+    The relative errors of `shear` are `solver` by the solve of the tractions, `time` by the step, and `mesh` by the
+    stiffness of spots. A `share` of `shear` is proportional to the area, and so its relative error is that of the area.
     """
     if whole <= 0.0:
         return replace(budget, friction=None)
@@ -337,18 +345,19 @@ def add_shear(
 
 
 def weight_of(slid: float, seconds: float) -> float:
-    """Return the weight of a step in a mean: the distance slid, or at rest a far smaller share of `seconds`."""
+    """Return the weight of a step in a mean: the distance `slid` [m]. At rest the weight is proportional to `seconds`
+    and far smaller."""
     return slid or seconds * AT_REST or AT_ONCE
 
 
 @dataclass(frozen=True)
 class ErrorSums:
-    """Sums of the budgets of many steps, weighted by the distance slid; the errors of friction are weighted by the
-    friction coefficient, too.
+    """Sums of the budgets of many steps. The weight of a step is the distance slid; errors of friction are also
+    weighted by the friction coefficient.
 
     At rest the weight is proportional to the duration, and much smaller, so that rest does not dilute the errors of a
-    slide; it is still smaller for steps without duration. `sums` has a row for friction and one for the area: the
-    weight, and the weighted sum of each part.
+    slide. Steps without duration have a still smaller weight. `sums` has one row for friction and one for the area. A
+    row consists of the sum of weights and the weighted sums of all parts of the error, in the order of `ErrorParts`.
     """
 
     sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
@@ -363,7 +372,7 @@ class ErrorSums:
         return ErrorSums(sums)
 
     def entries(self) -> dict[str, Entry]:
-        """Return the checkpoint entry of the sums; a checkpoint without this entry can be read, too."""
+        """Return the entry of these sums in a checkpoint. The entry is optional: older checkpoints lack it."""
         return {SUMS: Entry(self.sums.ravel(), optional=True)}
 
     @classmethod
@@ -386,8 +395,8 @@ class ErrorSums:
 
     @property
     def area(self) -> ErrorParts | None:
-        """Relative errors of the area by source, as a mean over distance, or over time without sliding; None without
-        contact."""
+        """Relative errors of the area by source, as a mean over the distance slid, or over time without sliding; None
+        without contact."""
         return self._mean(1)
 
     def _mean(self, index: int) -> ErrorParts | None:
@@ -395,8 +404,8 @@ class ErrorSums:
         return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: Any) -> dict[str, Any]:
-        """Return the requested `accuracy` and the relative errors of friction and area, by source and in total, as
-        plain data."""
+        """Return plain data: the requested `accuracy`, and the relative errors of friction and area by source and in
+        total."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: each.plain() for name, each in found.items() if each is not None}
         if self.friction is not None:
@@ -404,9 +413,9 @@ class ErrorSums:
         return {"accuracy": accuracy, **parts}
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
-        """Return sentences for run.log, with a remedy if the error of friction or area exceeds the requested accuracies
-        `asked`. `chosen` names the sources of error that depend on a setting which the program has chosen by the
-        accuracy."""
+        """Return sentences for run.log on the errors of friction and area. `asked` are the requested accuracies of
+        both. A sentence states a remedy if the error exceeds the accuracy. `chosen` names the sources of error whose
+        setting, such as the time step, the program has chosen from `numerics.accuracy`."""
         found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
@@ -420,8 +429,8 @@ class ErrorSums:
 
 
 def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> str:
-    """Return a sentence: a remedy if the error exceeds `accuracy`, else that the accuracy is met. `chosen` names the
-    sources whose settings the program has chosen."""
+    """Return the end of a sentence on an error: that the error is within `accuracy`, or else a remedy. `chosen` names
+    the sources of error whose settings the program has chosen from `numerics.accuracy`."""
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
@@ -430,12 +439,14 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
 
 
 def exceeds(error: float, accuracy: float) -> bool:
-    """Return True if an estimated error exceeds the requested accuracy, and its printed value the printed accuracy."""
+    """Return True if an estimated error exceeds the requested accuracy by so much that the printed numbers differ,
+    too."""
     return error > ROUNDED * accuracy
 
 
 def describe(parts: ErrorParts, name: str) -> str:
-    """Return a text with the total error in per cent of `name`, such as "friction", and its parts."""
+    """Return a text with a total error and its parts by source, in per cent. `name` is the quantity, "friction" or
+    another one."""
     there = [part for part in NAMES if getattr(parts, part)]
     shares = ", ".join(f"{SHOWN[part]} {per_cent(getattr(parts, part))}" for part in there)
     total = parts.of_friction if name == "friction" else parts.total
