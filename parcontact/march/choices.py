@@ -1,8 +1,8 @@
-"""Choices for a run that follow from its job alone: which effects are on, for which reason, and with which parameters.
+"""Choices for a run that follow from its job alone: which effects are on, why, and with which parameters.
 
 `scene.py` makes the objects chosen here, and `parcontact plan` prints the choices. The solver and the operators do not
 read the job. An effect that is off allocates nothing, calls nothing and writes nothing. Each decision is a method of
-`Choices` that returns a verdict, and is called once.
+`Choices` that is called once. It returns True if the effect is on, and the reason.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class Decided(cached_property[Decision]):
 
 
 def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
-    """Return a decorator that turns a method returning a verdict into a decision with this name."""
+    """Return a decorator for methods that return a verdict. It turns a method into the decision called `name`."""
     return lambda method: Decided(lambda choices: Decision(name, *method(choices)))
 
 
@@ -39,9 +39,10 @@ def choices(job: Job, until: float = 0.0) -> "Choices":
 
 @dataclass(frozen=True)
 class Choices:
-    """Choices that follow from a job alone: a `Decision` for each effect, and its parameters.
+    """Choices that follow from a job alone: a `Decision` for each effect, and the parameters of the effects.
 
-    Only modules that use `scene`, and effects of other packages, read `job`.
+    `job` is read by the modules of this room that use `scene`, and by effects of other packages, but by no other
+    module.
     """
 
     job: Job
@@ -64,7 +65,8 @@ class Choices:
 
     @cached_property
     def effects(self) -> dict[str, type[Effect[Any]]]:
-        """Effects that are on, each by a section of its own in the job, by their names in checkpoints."""
+        """The effects that are on and have a section of their own in the job, by the names of the effects in
+        checkpoints."""
         known = listing.effects_of(type(self.job).model_fields)
         found = [guarded(section, effect) for section, effect in known.items()]
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
@@ -92,13 +94,14 @@ class Choices:
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
-        """Laws of the shear stress in the contact area, one for each effect that has such a law."""
+        """Laws of the shear stress in the contact area, from all effects that add such a law."""
         found = [effect.shear(self.job) for effect in self.effects.values()]
         return tuple(shear for shear in found if shear is not None)
 
     @cached_property
     def folded(self) -> FoldedBranches:
-        """Which branches of the material have maps (`effects.branches`)."""
+        """The division of the branches of the material into branches with maps and folded branches without maps
+        (`effects.branches`)."""
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
         reason = next(filter(None, (why(self.job) for why in self.job.asked("why_not_folded"))), reason)
@@ -116,7 +119,8 @@ class Choices:
 
     @decided("folded branches")
     def folded_branches(self) -> Verdict:
-        """Decision to store no map for branches far faster or slower than the history."""
+        """Decision to fold branches that are far faster or slower than the history: no map is stored for a folded
+        branch."""
         found = self.folded
         if not found.folded:
             return False, found.reason or "no branch is far faster or slower than the history"
@@ -131,7 +135,8 @@ class Choices:
 
     @decided("yielding counterbody")
     def yielding(self) -> Verdict:
-        """Decision to bound pressures by the hardness, by another constraint of the solver."""
+        """Decision to bound pressures by the hardness of the counterbody. The solver then uses bounds from 0 to the
+        hardness."""
         bound = self.hardness
         return bound is not None, "material.hardness is not set" if bound is None else f"at a pressure of {bound:g} Pa"
 
@@ -144,7 +149,8 @@ class Choices:
 
     @cached_property
     def slides_along_x(self) -> bool:
-        """True if the surface slides along x on a periodic box, where a motion by whole cells is an index offset."""
+        """True if the surface slides along x only, on a periodic box. Motions by whole cells then shift the indices of
+        maps, and no heights are computed again."""
         across = [span.stage.velocity[1] for span in self.timeline.spans if span.moves]
         return bool(across) and not self.isolated.on and not any(across)
 
@@ -156,8 +162,8 @@ class Choices:
 
     @decided("sub-cell or oblique sliding")
     def part_cells(self) -> Verdict:
-        """Decision to compute heights again after each motion, except after motions by whole cells along x of a
-        periodic box."""
+        """Decision to compute heights again after each motion of the surface. A motion by whole cells along x of a
+        periodic box does not need this."""
         if not self.sliding.on:
             return False, "the surface does not move"
         if self.isolated.on:
@@ -246,14 +252,15 @@ class Choices:
 
     @decided("surface spectrum")
     def spectrum(self) -> Verdict:
-        """Decision to store the transform of the surface: moments are computed once, and forces are spectral sums."""
+        """Decision to store the transform of the surface. Moments of the surface are then computed once, and forces are
+        sums over waves."""
         on = any(isinstance(shape, Spectral) for shape in self.job.surface)
         return on, "the surface has waves or heights from a file" if on else "all its shapes are in closed form"
 
     @property
     def transforms(self) -> list[Any]:
-        """Settings that determine the transforms of a run together with the number of ranks. A restart compares
-        them."""
+        """Settings that, together with the number of ranks, determine the transforms of a run. Plans of transforms that
+        an earlier run has stored on this machine are found by these settings (`files.wisdom`)."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
         single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
         return [*kinds, single, [self.job.initial.state, steady]]
@@ -262,7 +269,8 @@ class Choices:
 
     @decided("energies")
     def energies(self) -> Verdict:
-        """Decision to compute energies: one reduction per step, and one operator application in a viscoelastic body."""
+        """Decision to compute energies. This takes one reduction per step, and in a viscoelastic body one application
+        of the operator per step."""
         asked = self.output.energy
         return asked, "output.energy asks for them" if asked else "output.energy is not set"
 
@@ -300,7 +308,7 @@ class Choices:
 
     @decided("checkpoints")
     def checkpoints(self) -> Verdict:
-        """Decision to write files to restart from during the run; one at the end is always written."""
+        """Decision to write checkpoints during the run. A checkpoint at the end is always written."""
         rules = self.job.checkpoint
         when = f"every {rules.every} steps" if rules.every is not None else f"every {rules.minutes:g} minutes"
         return True, f"{when} and at the end; {rules.keep} are kept"
