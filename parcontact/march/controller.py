@@ -1,29 +1,35 @@
 """The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
 
 **Tolerance.** `numerics.tolerance` is small enough for the scenes in which friction depends most on the solver. If
-`numerics.accuracy` has chosen this tolerance, solves may use a larger one. The estimated error of the solver must stay
-below OF_SOLVER times the accuracy of friction, and below OF_SOLVER_IN_AREA times the accuracy of the area. If the other
-parts of the error budget exceed the accuracy, the same shares of these parts are the limits. Errors are proportional to
-the certificate of a solve. The factor of the tolerance is a mean over the last steps. It is set to a power of the
-square root of two, so that rounding errors do not change it, and belongs to the state, so that a restarted run
-continues identically. The last solve before a change of velocity or load, and a steady start, have a small tolerance:
-the body remembers the error of the displacement, and a much larger modulus may multiply this error after the change.
-The last step of a stage seldom moves the surface by whole cells, so that its solve has a worse start than the steps
-from which the factor was learnt.
+`numerics.accuracy` has chosen this tolerance, solves may use a larger one, by a factor that follows from the last
+steps. The estimated error of the solver must stay below OF_SOLVER times the accuracy of friction, and below
+OF_SOLVER_IN_AREA times the accuracy of the area. If the other parts of the error budget exceed the accuracy, the same
+shares of these parts are the limits. Errors are proportional to the certificate of a solve. Each step thus gives a
+factor by which its tolerance might have been larger, and the factor of the next solve is the mean over the last steps.
+This mean is rounded to a power of the square root of two, so that rounding errors do not change the tolerance. It
+belongs to the state of a run, so that a restarted run continues identically.
 
-**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is OF_STEPS of the
-accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1 for backward Euler),
-the next step is
+The last solve before a change of velocity or load, and a steady start, have a small tolerance: the body remembers the
+error of the displacement, and a much larger modulus may multiply this error after the change. The first and the last
+step of a stage have a small tolerance, too. Their solves have worse starts than those of the other steps, from which
+the factor follows: the last step of a stage seldom moves the surface by whole cells.
 
-    dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
+**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is OF_STEPS times
+the accuracy. E varies as dt^p, with p = 3 for a displacement quadratic in time, 1.7 for a linear one, and 1 for
+backward Euler. The next step is therefore
 
-and a step with E > REJECTED E0 is repeated from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
-long; the step after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
-(1993), II.4). At rest steps are the shortest one times powers of the fourth root of two, against rounding errors. While
-the surface slides, steps end at multiples of their length, counted in cells from the first position of the surface
-(block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump, steps
-of parts of a cell, as long as E allows, lead back to multiples of whole cells, where heights are moved without a
-transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.laws`).
+    dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH).
+
+A step with E > REJECTED E0 is repeated from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as long,
+and the step after the repeated one does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential
+Equations I (1993), II.4). At rest the length of a step is the shortest length times a power of the fourth root of two,
+so that rounding errors do not change it.
+
+While the surface slides, steps end at multiples of their length, counted in cells from the first position of the
+surface (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156). After a
+jump, steps of parts of a cell, as long as E allows, lead back to multiples of whole cells, where heights are moved
+without a transform. Steps of a half, a third or a quarter of a cell start from the pressure one whole cell earlier
+(`march.laws`).
 
 **Embedded pair.** The time error is estimated from the difference between a step by one integrator and the same step by
 another. Both start from the same state and assume the same motion. An integrator turns the branch maps h_k at the start
@@ -37,8 +43,9 @@ A linear step, as after a jump, is compared with backward Euler, from which it d
     e = sum_k (exp(-z_k) - 1/(1 + z_k)) h_k + sum_k G_k ((1 - exp(-z_k))/z_k - 1/(1 + z_k)) du.
 
 The comparison takes no further solve. The rms of e divided by the rms of `A p`, both weighted by the pressure, measures
-the time error. A sample suffices: evenly spaced rows, SAMPLED_ROWS in full contact, more at smaller contact areas (by
-the square root of the ratio). If the sample misses the contact, as for a small sphere, all rows are used.
+the time error. Both are taken from a sample of evenly spaced rows: SAMPLED_ROWS in full contact, and more for a share A
+of the points in contact, in proportion to 1/A^(1/2). If the sample misses the contact, as for a small sphere, all rows
+are used.
 """
 
 import math
@@ -69,9 +76,10 @@ MISSED = 0.5  # accuracy: relative error of the load of a sample above which all
 class IntegratorDifference:
     """Result of the embedded pair for one step. All rms values are weighted by the pressure.
 
-    `difference` is relative, and grows with the step length to the power `order`. `slope` is the rms slope of the
-    surface along x, as the run's unit of height per its unit of length. `angle` is the rms change of the displacement
-    in the step divided by the standard deviation of heights: in full contact the angle by which a wave turns.
+    `difference` is the relative difference of both integrators, which grows with the step length to the power `order`.
+    `slope` is the rms slope of the surface along x, in the run's unit of height per unit of length. `angle` is the rms
+    change of the displacement in the step, divided by the standard deviation of heights. In full contact this is the
+    angle by which a wave turns.
     """
 
     difference: float
@@ -90,7 +98,8 @@ class _Weights(NamedTuple):
 
 
 class EmbeddedPair:
-    """Comparison of integrators in the steps of a relaxing body, on cells of length `dx`. It allocates no maps."""
+    """Comparison of integrators in the steps of a relaxing body. No maps are allocated. `dx` is the length of a cell
+    along x."""
 
     def __init__(self, slab: Slab, material: ZenerBody, dx: float) -> None:
         self.slab, self.material, self.dx = slab, material, dx
@@ -107,11 +116,12 @@ class EmbeddedPair:
         share: float,
         growth: float = 0.0,
     ) -> IntegratorDifference:
-        """Compare the integrators in a step under load; `memory` is the memory of the body after the step. One or two
-        messages; collective.
+        """Compare the integrators in a step under load. The comparison takes one sum over all ranks, or two;
+        collective.
 
-        `pressure` has the sum `load` over all ranks, on a `share` of the points; `displacement` is `A p/alpha`.
-        `growth` is dt over the length of the step before.
+        `memory` is the memory of the body after the step. The sum of `pressure` over all ranks is `load`, and a `share`
+        of the points is under pressure. `displacement` is `A p/alpha`. `growth` is dt divided by the length of the step
+        before.
         """
         weights = self._weights(dt, growth)
         seen, *sums = self._add(weights, trial, memory, pressure, displacement, self.stride(share))
@@ -129,8 +139,9 @@ class EmbeddedPair:
     def compare_without_load(
         self, dt: float, trial: Trial, memory: BodyMemory, growth: float = 0.0
     ) -> IntegratorDifference:
-        """Compare the integrators in a step without load; `memory` is the memory of the body after the step. The result
-        is the rms difference divided by the rms displacement; collective."""
+        """Compare the integrators in a step without load; collective. `memory` is the memory of the body after the
+        step, and `growth` is dt divided by the length of the step before. The result is the rms difference divided by
+        the rms displacement."""
         u, weights = surface_of(memory), self._weights(dt, growth)
         _, change, size, *_ = self._add(weights, trial, memory, np.ones_like(u), u, self.stride(1.0))
         return IntegratorDifference(math.sqrt(change / size) if size > 0.0 else 0.0, 0.0, weights.order)
@@ -195,7 +206,8 @@ SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
 
 @dataclass(frozen=True)
 class StepTolerance:
-    """Memory of the tolerance of solves: the mean, over the last steps, of log2(allowed tolerance/job's tolerance)."""
+    """Memory of the tolerance of solves: the mean, over the last steps, of log2(allowed tolerance divided by the
+    tolerance of the job)."""
 
     mean: float = 0.0
 
@@ -217,7 +229,7 @@ class TolerancePart:
 class Controller:
     """Controller of the tolerances and the lengths of steps in a run.
 
-    `timeline` has the stages of the `job`. `energies` is True if the job asks for energies. `exact` is True if all
+    `timeline` states the stages of the `job`. `energies` is True if the job asks for energies. `exact` is True if all
     contacts must be solved to the job's tolerance, whatever the error budget allows.
     """
 
@@ -240,13 +252,14 @@ class Controller:
 
     @cached_property
     def follows(self) -> bool:
-        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen it, at least one
-        stage has steps, and the run is not `exact`."""
+        """True if the tolerance of solves follows the error budget: `numerics.accuracy` has chosen the tolerance of the
+        job, at least one stage has steps, and the run is not `exact`."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
-        """Return the tolerance for the solve of a step; None means the job's tolerance, also in a jump. The tolerance
-        is smaller before a change and in the first and last step of a stage."""
+        """Return the tolerance for the solve of a step, or None for the tolerance of the job. Jumps are solved to the
+        tolerance of the job. The tolerance is smaller in the first and last step of a stage, and before a change of
+        velocity or load."""
         if step.dt == 0.0:
             return None
         own, most = self.job.numerics.tolerance, self.largest_tolerance(step)
@@ -255,8 +268,8 @@ class Controller:
         return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
 
     def largest_tolerance(self, step: Step) -> float:
-        """Return the limit on the tolerance of a step: finite before a change and for the first and last step of a
-        stage, infinite for other steps and jumps."""
+        """Return the limit on the tolerance of a step. It is finite in the first and last step of a stage and before a
+        change of velocity or load, and infinite in other steps and in jumps."""
         if step.dt == 0.0:
             return math.inf
         span = self.timeline.spans[step.stage]
@@ -265,7 +278,8 @@ class Controller:
         return min(most, FIRST) if (step.growth == 0.0 or ends) and self.relaxes else most
 
     def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
-        """Return the memory after a step with this error budget, whose solve has reached `certificate`."""
+        """Return the memory of the tolerance after a step. `certificate` is the error that the solve of the step has
+        reached, and `budget` is the error budget of the step."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
         room = _room(budget.area, OF_SOLVER_IN_AREA, self.asked.area)
@@ -278,7 +292,7 @@ class Controller:
     # -- length of steps ----------------------------------------------------------------------------------------------
 
     def propose(self, chosen: ChosenSteps, span: Span, number: int) -> Step:
-        """Return step `number` of a stage that chooses its steps; `chosen` holds the steps made so far."""
+        """Return step `number` of a stage that chooses its steps. `chosen` is the record of the steps made so far."""
         first = number == span.before + span.jumps + 1
         return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
 
@@ -295,11 +309,14 @@ class Controller:
     ) -> Step | MadeStep:
         """Return a shorter step to try if the error of a step is too large, else the record of the accepted step.
 
-        The step ends `end` [s] after the start of the stage. `rejected` is True if a longer step was tried before.
-        Under attraction the edge of contact has moved by `front` half process zones. The edge may move by one half
-        zone; for a relaxing body with energies, by the square root of the accuracy times a half zone. `begins` is True
-        if a contact begins or ends. Neither needs a step shorter than SNAP_SHARE of the longest step of the stage, or
-        than RELAXING times the shortest relaxation time: in such a step a jump meets the body before the body relaxes.
+        The step ends `end` [s] after the start of the stage, and `error` is its estimated relative error. `rejected` is
+        True if a longer step was tried before.
+
+        Under attraction the edge of contact has moved by `front` half process zones in the step. It may move by one
+        half process zone; if the body relaxes and the job asks for energies, by the square root of the accuracy times a
+        half process zone. `begins` is True if a contact begins or ends in the step. No step is shortened for these two
+        reasons below SNAP_SHARE times the longest step of the stage, or below RELAXING times the shortest relaxation
+        time: in a step so short the body cannot relax.
         """
         order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
         ratio = error / (OF_STEPS * self.asked.of_steps)
@@ -318,9 +335,9 @@ class Controller:
         return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
     def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
-        """Return the record of a step of length dt with a limit on the next step: the mean traction may change by at
-        most the root of the accuracy times its largest value. In this step the traction has changed by `turned` times
-        that value."""
+        """Return the record of a step of length dt with a limit on the next step, which follows from the mean traction.
+        In a step, the traction may change by the root of the accuracy times its largest value. In the step made it has
+        changed by `turned` times this value."""
         most = math.sqrt(self.asked.of_steps)
         if turned * made.next <= most * dt:
             return made
@@ -423,8 +440,8 @@ class Controller:
 
 
 def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
-    """Return the largest tolerance of the last solve before a stage: CLOSE if the body relaxes and the velocity,
-    control or load changes where the stage starts, else infinity."""
+    """Return the largest tolerance of the last solve before a stage. It is CLOSE if the body relaxes and the velocity,
+    control or load changes where the stage starts; otherwise it is infinite."""
     history, start = job.history, job.initial
     if stage == len(history) or not relaxes:
         return math.inf
@@ -436,8 +453,8 @@ def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
 
 
 def cells_per_step(most: float) -> float:
-    """Return the longest distance of a step in cells, at most `most`, out of 1, 2, 4, ... and 1/2, 1/3, ... 1/8, 1/10
-    ..."""
+    """Return the longest admissible distance of a step that is at most `most`, in cells. Admissible are 1, 2, 4, ...
+    cells, and 1/2, 1/3, ... 1/8, 1/10, ... of a cell."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most
