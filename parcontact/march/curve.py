@@ -1,7 +1,7 @@
 """Friction curves: steady sliding solved directly at many velocities and pressures.
 
-Each point is a line of steady.csv, and of steady_waves.csv for losses by wavelength; root writes them with messages and
-a picture.
+Each point of a curve is a line of steady.csv. If the losses by wavelength are requested, steady_waves.csv has one line
+per octave of wavelengths for each point. Root writes these tables, messages and a picture of the curve.
 """
 
 import math
@@ -47,7 +47,8 @@ class EarlierPoint(NamedTuple):
 
 
 class CurveTable:
-    """The tables of a friction curve in a directory. Raises OSError, and InputError for a table that cannot be read."""
+    """The tables of a friction curve in a directory. Raises OSError if a table cannot be written, and InputError if a
+    table cannot be read."""
 
     def __init__(
         self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
@@ -101,8 +102,8 @@ class CurveTable:
         files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
-        """Return the indices of points that are not in the table, and of the points `bare` in the table whose
-        requested maps are missing."""
+        """Return the indices of the points that must be solved. They are the points that the table lacks, and the
+        points with the indices `bare`, whose requested maps are missing."""
         found = tables.lacking_points(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -132,8 +133,8 @@ class CurveTable:
             self._console.warn(str(doubt), shown(doubt))
 
     def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
-        """Add the lines of a point, unless the table has the point already: such a point was solved for its maps
-        only."""
+        """Add the lines of a point to the tables. If the table has a line for this point already, nothing is written:
+        the point was solved again only for its maps."""
         m, speed = point.measures, point.speed
         if not tables.lacking_points([Wanted(speed, m.pressure, point.temperature)], self.known):
             return
@@ -150,13 +151,14 @@ class CurveTable:
         )
 
     def lose(self, at: Wanted, why: str) -> None:
-        """Record a point that could not be solved, and the reason `why`, unless it is in the table; raises OSError."""
+        """Record that a point could not be solved, with the reason `why`. A point that the table has is not recorded.
+        Raises OSError."""
         self._lost = tables.without([*tables.without(self._lost, [at]), LostPoint(at, why)], self.known)
         tables.write(self.path.parent, self._lost)
 
     def conclude(self, failures: int, draw: Draw | None) -> None:
-        """Sort the points of a curve that were solved in any order, draw the curve by `draw`, and report the number of
-        failures; raises OSError."""
+        """Sort the points of a curve, which may have been solved in any order, draw the curve by `draw`, and report the
+        number of `failures`. Raises OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -203,7 +205,8 @@ WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {whe
 
 
 def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
-    """Yield warnings about the solved points of a curve: the warnings of effects, and those of `describe_missed`."""
+    """Yield warnings about the solved points of a curve: first the warnings of effects, then warnings about errors that
+    exceed the accuracy (`describe_missed`)."""
     for asked in answers("steady", "doubts_of_points", job):
         yield from asked(points, job)
     yield from describe_missed(points, job, earlier)
@@ -212,7 +215,7 @@ def doubt_points(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoi
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
     """Yield warnings about points whose error of friction or of the corrected area exceeds the accuracy of the job.
 
-    Points of `earlier` runs count, too, although the shares of the sources in their errors are not known.
+    Points of `earlier` runs count, too. Only the sums of their errors are known, not the parts by source.
     """
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     known = [point for point in points if point.errors.resolved]
@@ -246,7 +249,8 @@ class Request:
     """Request for steady states at each combination of velocity, pressure and temperature.
 
     The surface moves along the unit vector `direction` with the speeds `velocities` [m/s] under the mean `pressures`
-    [Pa]. `temperatures` [deg C] may be empty; `waves` asks for the losses by wavelength.
+    [Pa]. `temperatures` [deg C] are empty if the job's temperature is used. `waves` is True if the losses by wavelength
+    are requested.
     """
 
     velocities: tuple[float, ...]
@@ -267,7 +271,9 @@ class Request:
 def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
-    """Return the request of a job's `steady` section, or of the arguments; raises InputError if it is incomplete."""
+    """Return the request for a friction curve. Velocities [m/s], pressures [Pa] and temperatures [deg C] that are not
+    given as arguments are those of the job's section `steady`. Raises InputError if velocities or pressures are missing
+    or not positive, or if an effect of the job forbids friction curves."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))
@@ -297,9 +303,12 @@ def _pressures(job: Job) -> tuple[float, ...]:
 class States(Protocol):
     """Solver of the steady states of a job, one velocity and pressure after the other; all methods are collective.
 
-    `table` is the name of an additional table with its columns, or None; `rows` returns its lines for the last state at
-    a velocity [m/s]. After `keep_in(directory)` intermediate results may be stored there, until `forget` is called when
-    the state is written; it returns a sentence on those of another program, or ''.
+    `table` is the name of an additional table and the names of its columns, or None. `rows` returns the lines of this
+    table for the last state, solved at a velocity [m/s].
+
+    After a call of `keep_in(directory)`, intermediate results of a state may be stored in this directory. `forget`
+    removes the intermediate results once the state is written. `keep_in` removes intermediate results of another
+    version of the program and returns a sentence on this, otherwise ''.
     """
 
     setup: Setup
@@ -328,7 +337,7 @@ def on_one_grid(job: Job, slab: Slab) -> States:
 
 
 def watch_contacts(setup: Setup) -> sanity.ContactWatch:
-    """Return the checks of the contacts of a curve. They give each kind of warning once for the curve."""
+    """Return the checks of the contacts of a curve. Each kind of warning is given once for the whole curve."""
     chosen = setup.choices
     return sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
@@ -341,7 +350,8 @@ def solve_point(sliding: States, wanted: Request, at: Wanted) -> Point:
 
 
 def transforms_of(job: Job) -> list[Any]:
-    """Return facts that, with the number of ranks, determine the transforms of a curve; a restart compares them."""
+    """Return settings that, together with the number of ranks, determine the transforms of a curve. Plans of transforms
+    that an earlier curve has stored on this machine are found by these settings (`files.wisdom`)."""
     return [*choices.choices(job).transforms, "curve"]
 
 
@@ -356,8 +366,8 @@ def run_curve(
     """Solve all missing points of a friction curve, and write each point as soon as it is solved; collective. Return
     the exit code.
 
-    If a point fails, the others are still solved, and the exit code is 1. `restart` of the options is `auto` or
-    `never`. `make` makes the solver of the states; `draw` draws the finished curve, on root.
+    If a point fails, the others are still solved, and the exit code is 1. The option `restart` is `auto` or `never`.
+    `make` returns the solver of the states. `draw` draws the finished curve, on root.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
