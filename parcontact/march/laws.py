@@ -3,13 +3,13 @@
 Start of a solve: pressures change with time and move with the surface. If the surface has moved by whole cells since
 one of the last steps, the pressure of that step is moved by as many cells, without rounding. In steady sliding the
 moved pressure is already the solution. With steps of a whole cell the last pressure is moved, extrapolated with the
-pressure before it; with steps of half a cell, the pressure before the last. With steps of a third or a quarter, an
-earlier pressure is moved, which only slides with chosen steps store. Otherwise the last two pressures are extrapolated
-in the body's frame.
+pressure before it. With steps of half a cell the pressure before the last one is moved. With steps of a third or a
+quarter of a cell a still earlier pressure is moved, which is stored only in slides with chosen steps. Otherwise the
+last two pressures are extrapolated in the body's frame.
 
-`DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.problem`), solved from the
-last pressures. `ClosingLaw` is the law of a surface whose finer roughness is squeezed in the interface: under pressure
-the mean planes of this roughness approach by the closing c. With the modulus alpha of a step, in which the pressure is
+`DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.problem`), solved from the last
+pressures. `ClosingLaw` is the law of a surface whose finer roughness is squeezed in the interface: under pressure the
+mean planes of this roughness approach by the closing c. With the modulus alpha of a step, in which the pressure is
 `alpha p`,
 
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
@@ -60,8 +60,8 @@ class StepError(RunError):
 
 
 class DetachedError(Exception):
-    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state before
-    it."""
+    """The surfaces have detached in a step that ends at `time` [s]. `load` is the load of the step, in the unit of its
+    control ([Pa], [N] or [m]). The run keeps the state before the step."""
 
     def __init__(self, time: float, load: float) -> None:
         super().__init__(time, load)
@@ -89,8 +89,8 @@ def of_solve(
 ) -> StepError:
     """Return the error for a step whose contact solve has `failed`; collective.
 
-    `tried` names the further attempts, and `last` is the contact of the last attempt. h are the heights of the surface
-    in the run's units; the surface moves by `moved` cells in the step.
+    `tried` names the further attempts, and `last` is the contact of the last attempt. `h` is the map of heights in the
+    run's units, shape (rows of this rank, nx). The surface moves by `moved` cells in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
@@ -134,7 +134,7 @@ def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> No
 
 
 def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
-    """Write the pressure from which the solve of a step starts into `out`, divided by the modulus `alpha` of the step.
+    """Put the start for the solve of a step into the map `out`: a pressure divided by the modulus `alpha` of the step.
     `pasts` are the last pressures, newest first."""
     if len(pasts) == 1:
         out[...] = pasts[0].pressure
@@ -181,15 +181,16 @@ def _travel(
 
 
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
-    """Return the contact law that an effect of the scene provides, else the law of the scene's constraint. An effect's
-    law that extends the law of the constraint gets it by the method `upon`."""
+    """Return the contact law of a scene: the law that an effect provides, or else the law of the scene's constraint on
+    pressures. A law with the method `upon` extends the law of the constraint: `upon` takes this law and returns the
+    extended one."""
     dry, law = DryLaw(scene), scene.law
     return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
 
 
 @dataclass(frozen=True)
 class DryLaw:
-    """Contact law of a scene's bounds on the pressure. It has no memory of its own."""
+    """Contact law of a scene's bounds on the pressure. This law has no memory of its own."""
 
     scene: Scene
     may_shorten = False
@@ -236,7 +237,7 @@ class DryLaw:
         return contact, f"the contact solve {failed.failure}; solved when retried with {', with '.join(tried)}"
 
     def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> EdgeMotion:
-        """Return no motion: the motion of edges in a step is not limited."""
+        """Return no motion: this law does not limit the motion of edges of contact in a step."""
         return EdgeMotion()
 
     def gap(self, memory: None) -> Array | None:
