@@ -1,10 +1,11 @@
-"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller after each step.
+"""A march: a scene, its state, and the loop over the steps of a timeline. After each step the tasks of the caller are
+done.
 
 `make_step` returns the next state of a scene and leaves the state before it unchanged. A step begins the body, solves
 the contact, measures, commits the body, estimates errors, and updates effects. A step that is rejected or fails is
-dropped; nothing has to be undone. No map is copied for this: the new pressure is in the spare map of the state, and the
-new displacement in a map of the solver's workspace, which gets the map of the old displacement in exchange. Operations
-in place come last, when nothing can fail.
+dropped; nothing has to be undone. No map of the old state is copied or changed by a step: the new pressure is in the
+spare map of the state. The new displacement is in a map of the solver's workspace, and the workspace gets the map of
+the old displacement in exchange. Operations in place come last, when nothing can fail.
 """
 
 import math
@@ -294,7 +295,8 @@ class March:
         return state.after(errors=replace(state.memories["errors"], sums=sums))
 
     def restore(self, contents: Contents) -> None:
-        """Restore the state of a checkpoint; collective. Raises InputError for a checkpoint that does not fit."""
+        """Restore the state of a checkpoint; collective. Raises InputError if the checkpoint lacks an entry or belongs
+        to another body."""
         self.state = restored(self.scene, self.state, contents)
 
     def entries(self) -> dict[str, Entry]:
@@ -306,10 +308,11 @@ class March:
         save_state(path, self.scene, self.state, facts)
 
     def field(self, name: str) -> Array:
-        """Return the rows of this rank of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of the rise of
-        `temperature` [K], as a new array; collective. Raises InputError for a temperature that is not computed.
+        """Return this rank's rows of a field as a new array, shape (rows of this rank, nx); collective.
 
-        `height` belongs to the rigid surface at its present position, so that `gap = displacement - height - approach`.
+        The fields are `pressure` [Pa], `displacement`, `gap` and `height` [m], and fields of effects, such as the rise
+        of `temperature` [K]. `height` belongs to the rigid surface at its present position, so that `gap = displacement
+        - height - approach`. Raises InputError for a field of an effect that the job does not use.
         """
         scene, state, units = self.scene, self.state, self.scene.units
         last, gap = state.contact.last, choose_contact_law(scene).gap(state.law)
@@ -338,9 +341,10 @@ class March:
 def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:
     """Return the step after the last one made.
 
-    At rest under a constant load a body without memory does not change: one step then replaces all further steps of a
-    stage whose time steps grow. This step ends where fields are written next, at the end of the step `stop`, or with
-    the stage. The decision follows from the state, so that it is the same after a restart.
+    At rest under a constant load a body without memory does not change. One step then replaces further steps of a stage
+    whose time steps grow. It ends with the first of three steps: the next one after which fields are written, the step
+    with the number `stop`, and the last one of the stage. The decision follows from the state, so that it is the same
+    after a restart.
     """
     number = state.row.step + 1
     span = timeline.span(number)
@@ -360,8 +364,8 @@ Task = Callable[[March], bool | None]
 def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
     """Advance the march step by step, and do the tasks in order after each step, until a task returns True.
 
-    Without `steps` all steps of the job are made, and the tasks are also done before the first one. Return True if a
-    task has ended the march.
+    If `steps` is None, all steps of the job are made, and the tasks are also done before the first step. Return True if
+    a task has ended the march.
     """
     if steps is None:
         if run_tasks(march, tasks):
