@@ -1,4 +1,4 @@
-"""The grid of a job that gives words for it: `points: auto`, and `from surface` for points and size of a measured map.
+"""The grid of a job that states it by words: `points: auto`, or `from surface` for points and size of a measured map.
 
 `load` and `load_cases` read a job like the functions of the same names in `job`, and replace these words by numbers.
 
@@ -61,8 +61,9 @@ class Loaded(Protocol):
 
 
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
-    """Return a guess of the contact for each load and speed of a job, whose shortest wave is `wave` [m] and whose box
-    has the `area` [m^2]. Only for friction curves a guess says how slow the sliding is."""
+    """Return a guess of the contact for each load and speed of a job. `wave` is the shortest wave of the surface [m],
+    and `area` is the area of the box [m^2]. A guess for a friction curve also states how slow the sliding is; in other
+    guesses this number is 0."""
     from ..effects.branches import relaxation_of
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
@@ -160,7 +161,7 @@ class Scenery(Part):
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Replace words such as `auto` for the grid in the source of a job by numbers. Return the origin of the job
+    """Replace words for the grid, such as `auto`, in the source of a job by numbers. Return the origin of the job
     (`job.parts.Origin`) with a sentence on the chosen numbers."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
@@ -290,11 +291,12 @@ def _take_grid(source: Source, origin: Origin) -> None:
 
 
 def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Return the numbers of points along x and y in a box with the spacing of the map, and the size [m] of the whole
-    map.
+    """Return two pairs: the numbers of points along x and y in a box, with the spacing of the measured map, and the
+    size [m] of the whole map. An array of heights has no size: the second result is then None.
 
-    The box has the sides `box` [m], or the size of the map where these are not numbers. A mirrored map is twice as
-    long. Raises InputError, also for line scans.
+    `box` is the length of both sides or a pair of lengths [m]. A side that is not a number is as long as the map. A
+    mirrored map is twice as long. Raises InputError if the surface does not have exactly one map or array, or if the
+    map is a line scan.
     """
     shapes = surface if isinstance(surface, list) else [surface]
     heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
