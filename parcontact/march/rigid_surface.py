@@ -51,7 +51,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
 
 
 def outline_surface(job: Job, fft: FFT) -> Surface:
-    """Return the surface of a job for planning, with waves that have no values."""
+    """Return the surface of a job for planning. Its map of waves is allocated but not computed."""
     waves = None
     if any(isinstance(part, jobs.Spectral) for part in job.surface):
         waves = allocate(shape_of(highest_waves(job), (fft.mx, fft.my), fft.columns), fft.complex, fft.slab.tally)
@@ -73,9 +73,9 @@ def _indenter(part: jobs.Indenter, grid: Grid) -> Shape:
 def shortest_measured(job: Job, surface: Surface) -> float | None:
     """Return the shortest wave [m] of a measured surface, from its spectrum on the grid; collective.
 
-    Return None if the job itself gives the waves of the surface, or if the surface has no slopes. A map that is not
+    Return None if the job itself states the waves of the surface, or if the surface has no slopes. A map that is not
     periodic is multiplied by a window, as a jump or a crease at its edges has waves of any length. The window raises
-    the highest number of waves in the box by up to 1. Half of this excess is subtracted.
+    the highest number of waves in the box by up to 1. The result is therefore computed from this number less 1/2.
     """
     if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
         return None
@@ -97,13 +97,15 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
 
 
 def shortest_of(job: Job) -> float | None:
-    """Return `shortest_measured` for a job on its grid, computed on this rank alone."""
+    """Return the shortest wave [m] of the measured surface of a job on its grid (`shortest_measured`), computed on this
+    rank alone."""
     slab = Slab.alone(*job.grid.points)
     return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """Return the largest numbers of waves in the box, along x and y, of the surface's parts given by waves."""
+    """Return the largest numbers of waves in the box, along x and y, of those parts of the surface that are sums of
+    waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:
         if isinstance(part, jobs.Wave):
@@ -199,8 +201,9 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
 
 
 class HeightRange(NamedTuple):
-    """Heights [m] of a surface: `span` from the lowest to the highest point (Sz; 0 if it is rounding), and the
-    `highest` point and the `mean`, relative to the datum of the surface."""
+    """Heights [m] of a surface. `span` is the difference between the highest and the lowest point (Sz), or 0 for a
+    surface that is flat up to rounding. `highest` is the highest point and `mean` the mean height, both relative to the
+    datum of the surface."""
 
     span: float
     highest: float
@@ -224,7 +227,7 @@ OBLONG = 1.5  # largest ratio of the sides of a pixel without a warning; most in
 
 
 def describe_treatment(prepared: "Prepared") -> list[str]:
-    """Return sentences on how a map was prepared."""
+    """Return sentences on how a measured map was prepared."""
     part, cut, done, size = prepared.part, prepared.cut, prepared.treated, prepared.size
     (ny, nx), (lx, ly), odd = cut.shape, (quantity(length, "m", 4) for length in size), int(done.outliers.sum())
     lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
@@ -264,7 +267,7 @@ WARN_OBLONG_POINTS = Kind(
 
 
 def doubt_sizes(prepared: "Prepared") -> Iterator[Doubt]:
-    """Yield warnings about the size of a map whose units may be confused."""
+    """Yield warnings about the size, the spacing and the heights of a map, if its units may be confused."""
     found, name = prepared.whole, prepared.part.path.name
     (ny, nx), (lx, ly) = found.heights.shape, found.size
     dx, dy = lx / nx, ly / ny
@@ -288,7 +291,7 @@ WARN_OUTLIERS = Kind(
 
 
 def doubt_outliers(prepared: "Prepared") -> Iterator[Doubt]:
-    """Yield a warning about outliers, if there are any and they are kept."""
+    """Yield a warning if a map has outliers and they are not clipped."""
     from ..job import measured_maps
     from ..physics.roughness import surface_statistics
 
