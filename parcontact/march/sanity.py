@@ -1,7 +1,9 @@
-"""Warnings about a scene, from its heights and its rubber before a run, and from its contacts during it.
+"""Warnings about a scene, from its heights and its rubber before a run, and from its contacts during the run.
 
-Warnings that follow from a job alone are in `job/meaning.py`. Sums over all points decide, so that all ranks
-agree. The rubber of a job may not have been measured at the frequencies and temperatures of the job."""
+Warnings that follow from a job alone are in `job/meaning.py`. All ranks give the same warnings, since every warning
+depends on sums over all ranks. The rubber of a job may not have been measured at the frequencies and temperatures of
+the job.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -67,14 +69,14 @@ def refuse_memory(job: Job) -> None:
 
 
 def is_quickly_made(job: Job) -> bool:
-    """Return True if warnings depend on the heights of a job, and the grid has few enough points to compute the heights
-    for these warnings alone."""
+    """Return True if warnings depend on the heights of a job, and if the grid is so small that the heights can be
+    computed for these warnings alone."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
 def describe_waves(job: Job) -> list[str]:
-    """Return the sentences of effects on the waves of a job's surface, computed on one grid on one rank; an empty list
-    for a flat surface, or for one with too many points."""
+    """Return sentences of effects on the waves of a job's surface. The surface is computed on one grid and one rank.
+    The list is empty for a flat surface, and for a grid with too many points."""
     if job.grid.nx * job.grid.ny > FEW_POINTS:
         return []
     setup = set_up(job, Slab.alone(*job.grid.points))
@@ -91,13 +93,14 @@ def describe_waves(job: Job) -> list[str]:
 
 
 def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[Doubt]:
-    """Return warnings about a job at temperatures [deg C] and about its heights; collective. Raises InputError with
-    `numerics.strict`."""
+    """Return warnings about a job at temperatures [deg C] and about its heights; collective. Raises InputError if there
+    are warnings about heights and `numerics.strict` is set."""
     return [*setup.job.doubts, *doubt_band(setup.job, temperatures), *check_heights(setup)]
 
 
 def check_heights(setup: Setup) -> list[Doubt]:
-    """Return warnings about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
+    """Return warnings about the heights of a scene; collective. Raises InputError if there are any and
+    `numerics.strict` is set."""
     found = list(_check_heights(setup))
     if found and setup.choices.numerics.strict:
         place = f"{setup.job.origin.strict}: " if setup.job.origin.strict else ""
@@ -126,14 +129,14 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
 
 
 def has_full_contact(setup: Setup) -> bool:
-    """Return True if the approach has an upper limit: the body is periodic, its mean level is fixed, and no hardness
-    bounds the pressure."""
+    """Return True if the approach has an upper limit. This is so if the body is periodic, its mean level is fixed, and
+    no hardness bounds the pressure."""
     return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
 
 
 def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
-    """Return a sentence if an approach [m] is beyond full contact, else ''; heights have the mean
-    `mean` [m] above the datum of the surface."""
+    """Return a sentence if an approach [m] is beyond full contact, else ''. `mean` is the mean height [m] above the
+    datum of the surface."""
     closed = -mean - setup.surface.datum
     rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
     if approach - closed <= rounding:
@@ -145,7 +148,7 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def below_rounding(setup: Setup, approach: float) -> str:
-    """Return a sentence if an approach [m] other than 0 is lost in the rounding of the heights, else ''."""
+    """Return a sentence if an approach [m] is smaller than the rounding of the heights and is not 0, else ''."""
     heights = setup.heights.span + abs(setup.surface.datum)
     least = float(np.finfo(np.float64).eps) / RESOLVED * heights
     if not 0.0 < abs(approach) < least:
@@ -157,8 +160,7 @@ def below_rounding(setup: Setup, approach: float) -> str:
 
 
 def refuse_approaches(setup: Setup) -> None:
-    """Raise JobError for stages whose approach is beyond full contact, or is lost in the rounding of the
-    heights."""
+    """Raise JobError for stages whose approach is beyond full contact, or smaller than the rounding of the heights."""
     mistakes, bounded = [], has_full_contact(setup)
     for index, stage in enumerate(setup.job.history):
         if stage.control != "approach":
@@ -234,8 +236,11 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Checks the contact of each step, and gives each kind of warning once. `further` are the checks of effects; `mesh`
-    has the points of the grid."""
+    """Checks the contact of each step, and gives each kind of warning once.
+
+    If `strict` is True, warnings are errors. `more` is the remedy in a warning about few cells. `further` are the
+    checks of effects: functions of the measures and a place. `mesh` states the points of the grid.
+    """
 
     strict: bool
     timeline: Timeline
@@ -252,13 +257,15 @@ class ContactWatch:
         return cls(job.numerics.strict, timeline, more=more_points(job.grid), further=further, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
-        """Return warnings about a step; raises RunError if warnings are errors."""
+        """Return the new warnings about the contact of a step. Raises RunError if there are any and `numerics.strict`
+        is set."""
         ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
         return self.check_point(measures, f"step {step}", ends_a_stage)
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
-        """Return warnings about a contact. Only a `final` contact, at the end of a stage or of a solve, is checked for
-        too few cells. Raises RunError if the job turns warnings into errors."""
+        """Return the new warnings about a contact at the place `where`. Only a `final` contact, at the end of a stage
+        or of a solve, is checked for too few cells. Raises RunError if there are warnings and `numerics.strict` is
+        set."""
         found = [WARN_EDGE("", {"where": where})] if measures.at_edge else []
         found += doubt_cells(measures, self.mesh, where, self.more) if final else ()
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
@@ -289,7 +296,8 @@ WARN_CELLS = Kind(
 
 
 def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a warning about contacts of few cells, mostly edge cells or parts of a cell; `more` states the remedy."""
+    """Yield a warning if spots of contact are only a few cells wide, or smaller than a cell. `more` states the
+    remedy."""
     area, corrected = measures.contact_area, measures.contact_area_corrected
     if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
         yield WARN_BELOW_A_CELL("", {"where": where, "more": more})
@@ -305,9 +313,10 @@ NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
 
 
 class ExcitedBand(NamedTuple):
-    """Frequency range [Hz] that a job excites at a temperature [deg C], and the shift factor a_T at this temperature.
+    """The range of frequencies [Hz] that a job excites at a temperature [deg C], and the shift factor a_T at this
+    temperature.
 
-    The temperature is None if the moduli do not depend on it.
+    The temperature is None if the moduli do not depend on the temperature.
     """
 
     temperature: float | None
@@ -316,13 +325,14 @@ class ExcitedBand(NamedTuple):
 
     @property
     def reduced(self) -> tuple[float, float]:
-        """Frequency range [Hz] with the same moduli at the reference temperature."""
+        """The range of frequencies [Hz] reduced to the reference temperature, at which the moduli are the same: the
+        frequencies times a_T."""
         return self.band[0] * self.factor, self.band[1] * self.factor
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
-    """Return the frequency range that a job excites at each temperature of a friction curve, or at the temperature of
-    the material if there is no curve; an empty list if the surface does not move."""
+    """Return the range of frequencies that a job excites, for each temperature of a friction curve, or for the
+    temperature of the material if there is no curve. The list is empty if the surface does not move."""
     if (band := excited_band(job)) is None:
         return []
     body = _body(job)
@@ -345,7 +355,7 @@ WARN_FREQUENCIES = Kind(
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
-    belong to a friction curve; without a curve the temperature of the material counts."""
+    are those of a friction curve. Without a curve, the temperature of the material is used."""
     if (body := _body(job)) is None:
         return
     if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job
