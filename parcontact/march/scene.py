@@ -1,7 +1,7 @@
 """The objects of a calculation, made from a job as `choices.py` decides.
 
-A setup has the rigid surface, the body and the units; steady sliding takes it and has its own solver. A scene adds the
-solver, energies, measures and effects of steps in time.
+A setup consists of the rigid surface, the body and the units, and is used by steady sliding, which has its own solver.
+A scene is used by steps in time. It consists of a setup, the solver, energies, measures and effects.
 """
 
 import math
@@ -45,10 +45,10 @@ class Setup:
     """The parts that every calculation on a job shares: choices, slab, surface, units and body.
 
     `heights` is the range of heights of the surface. `height` [m] is their span, or the shorter side of a cell if the
-    surface is flat. `shortest` [m] is the shortest wave of a measured map, None without a map. `size` is the box, and
-    `prony` the relaxation function, in the run's units and seconds. `remarks` are notes on measured maps and warnings
-    about them. `factors` returns the factors of the moduli of softened rubber as a function of the wavenumber, None
-    without softening (`physics.halfspace`).
+    surface is flat. `shortest` [m] is the shortest wave of a measured map, None without a map. `size` is the size of
+    the box in the run's units, and `prony` is the relaxation function in the run's units and seconds. `remarks` are
+    notes on measured maps and warnings about these maps. `factors` is None without softening. With softening it is a
+    function that returns the factors of the moduli for an array of wavenumbers (`physics.halfspace`).
     """
 
     choices: Choices
@@ -92,17 +92,19 @@ class Setup:
         return HalfSpace(self.size, poisson, kernel, free, other, cyclic, self.factors)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
-        """Return a velocity [m/s] in the run's units of length per second."""
+        """Return a velocity [m/s] in the run's unit of length per second."""
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def probe(self) -> Probe:
-        """Return a new probe of measures, with the shear that effects add, and the hardness if the job has one."""
+        """Return a new probe, which measures contacts. It includes the shear that effects add, and the hardness if the
+        job states one."""
         return Probe(self.slab, self.surface, self.units, self.choices.shears, self.choices.hardness)
 
 
 @dataclass
 class Scene:
-    """All objects of a calculation in time. `law` is the contact law of an effect, or None for the usual law."""
+    """All objects of a calculation in time. `law` is the contact law of an effect, or None for the law of the scene's
+    bounds on the pressure."""
 
     setup: Setup
     motion: Motion
@@ -134,8 +136,8 @@ class Scene:
         return self.setup.units
 
     def relax(self, memories: Memories) -> None:
-        """Set all relaxation times to those at the job's temperature, multiplied by the factors of the effects, which
-        follow from their `memories`. Raises RunError."""
+        """Set all relaxation times to those at the job's temperature, multiplied by the factors of the effects. The
+        factors follow from the `memories` of the effects. Raises RunError."""
         factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
         if factor == self.time_factor:
             return
@@ -150,8 +152,8 @@ class Scene:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
 
     def body_for_shear(self, slab: Slab) -> tuple[ZenerBody, ElasticEnergy | ZenerEnergy | None]:
-        """Return a second body for displacements along the surface on the given slab, and its energies if the job asks
-        for them, else None. Its relaxation follows the scene's body."""
+        """Return a second body, for displacements along the surface, on the given slab, and the energies of this body.
+        The energies are None unless the job asks for energies. The second body relaxes like the scene's body."""
         chosen, folded, prony = self.choices, self.folded, self.setup.prony
         integrator = chosen.numerics.integrator
         body = ZenerBody(slab, prony, integrator, folded.memoryless, folded.frozen)
@@ -173,30 +175,31 @@ class Scene:
 
     @cached_property
     def properties(self) -> RunProperties:
-        """Properties of the run for its error budget, with the present relaxation of the body."""
+        """Properties of the run for the error budget, with the present relaxation of the body."""
         branches = self.material.branched
         prony = None if branches is None else branches.prony
         return properties_of(self.job, self.setup.shortest, self.folded.bound, prony)
 
     @cached_property
     def integrators(self) -> EmbeddedPair | None:
-        """Comparison of the integrators of a body with branches, None for another body."""
+        """Comparison of the integrators for a body with branches; None for another body."""
         branches = self.material.branched
         return None if branches is None else EmbeddedPair(self.slab, branches, self.choices.grid.dx / self.units.length)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:
-        """A solver and operators in double precision, made at the first use, which is collective."""
+        """A solver and operators in double precision. They are made at the first use, which is collective."""
         return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
 
     def heights(self, position: Vector) -> Array:
-        """Return the heights of the rigid surface at a position: this rank's rows, in the run's units, a new array."""
+        """Return the heights of the rigid surface at a position as a new array: this rank's rows, in the run's
+        units."""
         base, offset = self.motion.at(position).parts
         return np.roll(base, offset, axis=1)
 
     def gap(self, displacement: Array, position: Vector, approach: float) -> Array:
-        """Return the gap [m] on this rank's rows for a surface at a position; displacement and approach are in run's
-        units."""
+        """Return the gap [m] on this rank's rows for the surface at a position [m]. The displacement and the approach
+        are in the run's units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Box:
@@ -220,7 +223,8 @@ def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> S
 
 
 def outline(job: Job, slab: Slab) -> Setup:
-    """Return the setup of a job for planning: its slab only counts, the surface has only waves, and units are 1."""
+    """Return the setup of a job for planning. Its slab only counts memory, its surface has waves without values, and
+    all units are 1."""
     slab.tally.purpose = "transforms"
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
@@ -265,8 +269,8 @@ def solver_on(
 
 
 def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
-    """Return a function that makes a solver and operators on the tiles that cover the contact,
-    on one rank; None if the body cannot be solved on tiles of this grid."""
+    """Return a function that makes a solver and operators on the tiles that cover the contact, on one rank. Return None
+    if the body cannot be solved on tiles of this grid."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 
