@@ -1,6 +1,6 @@
 """The state of a run, which holds all that one step passes to the next, and the error budget of a step.
 
-A checkpoint is one loop over the parts of the state.
+A run consists of parts with a memory (`physics.records.RunPart`). Checkpoints are written and read part by part.
 """
 
 import math
@@ -37,10 +37,11 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 class StepErrors:
     """Relative errors of a step.
 
-    `budget` has the errors of friction and area by their sources; None without contact. `step` is the error that the
-    length of the step alone causes; it determines chosen steps. `friction` is the friction coefficient of the body,
-    from which the next step computes its change; infinite, for unknown, after a jump. `lasting` is the budget without
-    the error of a rise of friction; it sets the tolerance of the next solves.
+    `budget` states the errors of friction and area by their sources; it is None without contact. `step` is the error
+    that the length of the step alone causes. If the stage chooses its steps, the length of the next step follows from
+    `step`. `friction` is the friction coefficient of the body, from which the next step computes the change of
+    friction; it is infinite after a jump, when it is unknown. `lasting` is the budget without the error of a rise of
+    friction. The tolerance of the next solves follows from `lasting`.
     """
 
     budget: ErrorBudget | None
@@ -60,7 +61,7 @@ class StepErrors:
 
     @property
     def of_area(self) -> float:
-        """The relative error of the contact area, 0 where there is none."""
+        """Relative error of the contact area; 0 without contact."""
         return 0.0 if self.budget is None else self.budget.area.total
 
 
@@ -86,9 +87,9 @@ class SolvedStep:
 
 @dataclass(frozen=True)
 class ErrorMemory:
-    """Memory of errors. `friction` is the friction coefficient of the body in the last step; after a jump it is
-    unknown, stored as infinity. `sums` are the sums of the error budgets of all steps. `energy` [J] is the summed error
-    of dissipated energy and of slip loss, infinite if unknown."""
+    """Memory of the errors of a run. `friction` is the friction coefficient of the body in the last step; after a jump
+    it is unknown and stored as infinity. `sums` are the sums of the error budgets of all steps. `energy` [J] is the
+    summed error of dissipated energy and slip loss; it is infinite if unknown."""
 
     friction: float = math.inf
     sums: ErrorSums = field(default_factory=ErrorSums)
@@ -97,8 +98,8 @@ class ErrorMemory:
 
 @dataclass(frozen=True)
 class BudgetPart:
-    """The part of a run that remembers its errors. `relaxes` is True for a viscoelastic body, `energies` if the run has
-    energies. Its checkpoint entries are optional."""
+    """The part of a run that remembers the errors of all steps. `relaxes` is True for a viscoelastic body, and
+    `energies` is True if the job asks for energies. All entries of this part in checkpoints are optional."""
 
     relaxes: bool
     energies: bool = False
@@ -117,10 +118,12 @@ class BudgetPart:
 
 
 def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared | None, dissipated: float) -> float:
-    """Return the summed error of energies [J] after a further step; infinity if `errors` is None.
+    """Return the summed error of energies [J] after a further step: `summed` is the sum before the step. Return
+    infinity if `errors` is None.
 
-    The body has `dissipated` an energy [J] in the step. The relative error of this energy is the error by the step
-    length plus ENERGY times the error of the area. Energy lost in slip has the relative error of friction.
+    `dissipated` is the energy [J] that the body dissipates in the step. Its relative error is the error by the step
+    length plus ENERGY times the error of the area. The energy lost in slip, in `sheared`, has the relative error of
+    friction.
     """
     if errors is None:
         return math.inf
@@ -129,8 +132,8 @@ def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared 
 
 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
-    """Return the estimated errors of a step; collective. `friction` is the friction of the body in the step before,
-    infinite if unknown or after a jump."""
+    """Return the estimated errors of a step; collective. `friction` is the friction coefficient of the body in the step
+    before, infinite if unknown or after a jump."""
     if not states_errors(scene.material):
         return StepErrors(None, 0.0, math.inf, None)
     run, measures = scene.properties, solved.measures
@@ -229,7 +232,8 @@ FURTHER = 2  # tuning: number of pressures kept for starts, from three and four 
 
 @dataclass(frozen=True)
 class State:
-    """A run after a step: the memories of its parts, by name (`parts_of`). `make_step` returns a new state.
+    """The state of a run after a step: the memories of its parts, by the names of the parts (`parts_of`). `make_step`
+    returns a new state.
 
     Maps are in the run's units. A state shares most maps with its successor. The step after the successor overwrites
     the oldest maps of this state; from then on this state is invalid.
@@ -238,7 +242,7 @@ class State:
     memories: Memories
 
     def after(self, **changes: Any) -> "State":
-        """Return a copy of the state with new memories of some parts, given by name."""
+        """Return a copy of the state with new memories for some parts. The keywords are the names of these parts."""
         return State({**self.memories, **changes})
 
     @property
@@ -270,13 +274,13 @@ class State:
 
     @property
     def friction(self) -> float:
-        """Friction coefficient of the body in the last step; infinite, for unknown, after a jump."""
+        """Friction coefficient of the body in the last step; infinite after a jump, when it is unknown."""
         memory: ErrorMemory = self.memories["errors"]
         return memory.friction
 
     @property
     def errors(self) -> ErrorSums:
-        """Sums of the error budget."""
+        """Sums of the error budgets of all steps."""
         memory: ErrorMemory = self.memories["errors"]
         return memory.sums
 
@@ -295,8 +299,8 @@ class State:
 
 
 def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
-    """Return all parts of a run that have a memory, by their names in checkpoints. Raises InputError if an effect has
-    the name of another part."""
+    """Return all parts of a run that have a memory, by their names in checkpoints. Raises InputError if the name of an
+    effect is already the name of another part."""
     choices = scene.choices
     if taken := sorted(RESERVED & choices.effects.keys()):
         raise InputError(
@@ -412,7 +416,8 @@ def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
 
 
 def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, approach: float) -> State:
-    """Return the first state of a run under a constant `pressure`, which is copied, with the friction of `row`."""
+    """Return the first state of a run that begins under a constant `pressure`. The pressure is copied. The friction
+    coefficient of the body before the first step is taken from `row`."""
     newest, others = state.contact.pressures[:2], state.contact.pressures[2:]
     for past in newest:
         past.pressure[...] = pressure
@@ -423,7 +428,8 @@ def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, app
 
 
 def completed(scene: Scene, state: State) -> State:
-    """Return the state with the energies [J] and the columns of effects added to its row."""
+    """Return the state with a complete record of the last step: the energies [J] and the columns of effects are added
+    to `row`."""
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
     added = effect_values(scene.effects, state.memories)
     error = math.nan if state.row.step else error_of_energies(scene, 0.0, 0.0, state.memories)
@@ -436,8 +442,8 @@ def energies_of(
     scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
     """Return work, stored and dissipated energy [J], and the energy dissipated in each branch; NaN without energies.
-    The work is done on the body, unless an effect computes the work of the load. `of_effects` has the memories of the
-    effects by name."""
+    The work is done on the body, unless an effect computes the work of the load. `of_effects` maps the names of effects
+    to their memories."""
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit, dissipated = scene.energy.unit, memory.dissipated
@@ -455,8 +461,9 @@ def energies_of(
 def error_of_energies(scene: Scene, summed: float, of_stored: float, of_effects: Memories) -> float:
     """Return the error of the energies [J] since the start; NaN without energies or if unknown.
 
-    An effect may compute this error. Otherwise the error is `summed` plus ENERGY times `of_stored` [J]; `of_stored` is
-    the stored energy times the relative error of the area."""
+    An effect may compute this error. Otherwise it is the sum of two parts: the error `summed` over all steps, and
+    ENERGY times `of_stored`. `of_stored` [J] is the stored energy times the relative error of the area.
+    """
     if scene.energy is None:
         return math.nan
     found = (effect.error_energy(of_effects[name]) for name, effect in scene.effects.items())
@@ -476,7 +483,7 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
 
 
 def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
-    """Write a checkpoint of a state, with the plans of its transforms; collective. Raises RunError."""
+    """Write a checkpoint of a state, with the plans of the run's transforms; collective. Raises RunError."""
     everything = {**entries(scene, state), "plans/all": Entry(wisdom.gather(scene.slab))}
     checkpoint.write_checkpoint(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)
 
