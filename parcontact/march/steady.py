@@ -49,12 +49,13 @@ Vector = tuple[float, float]
 class Point:
     """A steady state of sliding, with its measures, errors and cost.
 
-    `velocity` [m/s], `pressure` [Pa] and `temperature` [deg C] (NaN if none is given) are its parameters;
-    `shift_factor` is the ratio of relaxation times to those at the reference temperature. `friction` is the dissipated
-    power divided by load and speed, plus the friction of an interface; `errors` is its error budget. `measures` holds
-    friction by the slopes of the rigid surface, which differs by a mesh error. `operator_calls` are counted as
-    applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free box, whose wake
-    continues outside). `effects` holds the results of effects by section.
+    The state is that at `velocity` [m/s], mean `pressure` [Pa] and `temperature` [deg C], which is NaN if none is
+    given. `shift_factor` is the ratio of relaxation times to those at the reference temperature. `friction` is the
+    dissipated power divided by load and speed, plus the friction of an interface. `errors` is the error budget of
+    friction and area. `measures` includes friction by the slopes of the rigid surface, which differs from `friction` by
+    a mesh error. `operator_calls` are counted as applications on the finest grid. `dissipated` is the power [W] lost in
+    each branch. It is empty for a free box, whose wake continues outside of the box. `effects` maps sections of the job
+    to the results of their effects.
     """
 
     velocity: Vector
@@ -77,8 +78,8 @@ class Point:
 
     @property
     def error_friction(self) -> float:
-        """Relative error of friction, 1 or more if the error exceeds friction itself; NaN without friction, and if
-        spots may be smaller than a cell."""
+        """Relative error of friction, 1 or more if the error exceeds friction itself. NaN without friction, or if spots
+        may be smaller than a cell."""
         return self.errors.friction.of_friction if self.errors.friction and self.errors.resolved else math.nan
 
     @property
@@ -87,13 +88,13 @@ class Point:
         return self.errors.area.total if self.errors.resolved else math.nan
 
     def with_effect(self, section: str, found: Any) -> Point:
-        """Return the point with the result `found` of the effect of a section."""
+        """Return the point with `found`, the result of the effect that has this `section` in the job."""
         return replace(self, effects={**self.effects, section: found})
 
 
 def in_rounds(points: Sequence[Point]) -> Point:
-    """Return the last of the points that the rounds of a fixed point have given, with the cost of all rounds. The
-    relative changes of friction and area in the last round are added to its errors."""
+    """Return the last of several points, which were solved one after the other in the rounds of a fixed point. Its cost
+    is the cost of all rounds. The relative changes of friction and area in the last round are added to its errors."""
     *_, before, last = [*points[-1:], *points]
     friction, area = (
         abs(one - other) / one if one > 0.0 else 0.0
@@ -110,7 +111,8 @@ ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of o
 
 
 def branch_powers(setup: Setup, contact: Contact, velocity: Vector) -> Array:
-    """Return the power [W] that waves of each octave lose in each branch, shape (branches, octaves); collective.
+    """Return the power [W] that waves of each octave of wavelengths lose in each branch, shape (branches, octaves);
+    collective.
 
     The first octave is from the longer side of the box to half of it. The box must be periodic, so that waves are
     independent.
@@ -141,7 +143,8 @@ def count_octaves(setup: Setup) -> int:
 
 
 def branch_maps(setup: Setup, contact: Contact, velocity: Vector, out: Array) -> Iterator[Array]:
-    """Yield the map h_k of each branch in steady sliding at a velocity [m/s], each in `out`. Collective."""
+    """Yield the map h_k of each branch in steady sliding at a velocity [m/s]; collective. Each map overwrites the map
+    before in the array `out`."""
     fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:
         for k in range(setup.prony.moduli.size):
@@ -178,7 +181,7 @@ class SteadySliding:
 
     Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on the
     certificates of solves follows from the tolerance of the job and is at most `most`. Raises InputError for a body
-    with a memory that has no branches.
+    that has a memory but no branches.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -218,8 +221,8 @@ class SteadySliding:
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
-        Effects may repeat the solve until their own unknowns settle, by `loops` in their modules `steady`. Raises
-        RunError, with the certificate reached, if no start leads to a solution, or if a loop does not settle.
+        An effect may repeat the solve until its own unknowns settle, by a loop in its module `steady`. Raises RunError,
+        with the certificate reached, if no start leads to a solution, or if a loop does not settle.
         """
         solve = self._solve
         for loop in self.loops:
@@ -276,7 +279,7 @@ class SteadySliding:
     table: tuple[str, Sequence[str]] | None = None
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
-        """Return warnings about the job, also at these temperatures [deg C]; collective."""
+        """Return warnings about the job and its heights, also at the given temperatures [deg C]; collective."""
         return sanity.find_doubts(self.setup, temperatures)
 
     def notes(self) -> list[str]:
@@ -296,8 +299,8 @@ class SteadySliding:
         return [[*place, *pair] for pair in zip(*map(np.ndarray.tolist, self.shares(velocity)), strict=True)]
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
-        """Return the wavelengths [m] of the octaves of `branch_powers`, and the share of each in the friction power;
-        collective."""
+        """Return two arrays: the longest wavelengths [m] of the octaves of `branch_powers`, and the shares of the
+        octaves in the power that friction dissipates; collective."""
         assert self.contact is not None
         power = branch_powers(self.setup, self.contact, velocity)
         total = power.sum()
@@ -362,9 +365,8 @@ class SteadySliding:
 def judge_state(
     setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return the friction coefficient, and the relative errors of friction and area. Friction is the sum of
-    `by_energy`, which follows from the dissipated power, and the friction of an interface. `known` are the properties
-    of the run."""
+    """Return the friction coefficient and the error budget of a steady state. Friction is the sum of `by_energy`, which
+    follows from the dissipated power, and the friction of an interface. `known` are the properties of the run."""
     friction = by_energy + measures.friction_interface
     seen = StepObservation(
         certificate.complementarity,
@@ -380,9 +382,11 @@ def judge_state(
 
 
 def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
-    """Return the grid lines along a velocity [m/s] and the ratio |G|/G_inf. The longest wave along the lines has the
-    modulus G; waves that do not vary along the lines have the modulus G_inf. Return None for an elastic body, a line of
-    points, a free box, and an oblique velocity."""
+    """Return the grid lines along which the body slides, with the contrast |G|/G_inf (`contact.certificate.Lines`).
+
+    G is the modulus for the longest wave along the lines. G_inf is the modulus for waves that do not vary along the
+    lines. `velocity` is in m/s. Return None for an elastic body, a line of points, a free box, or an oblique velocity.
+    """
     grid = setup.grid
     if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
         return None
@@ -395,12 +399,13 @@ def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
 
 
 def tolerance_of(asked: float, free: bool = False) -> float:
-    """Return the limit on the certificate of a steady state for the tolerance `asked`; `free` for a free box."""
+    """Return the limit on the certificate of a steady state, for the tolerance `asked` of the job. `free` is True for a
+    free box."""
     return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 
 def direction_of(velocity: Vector) -> tuple[float, float]:
-    """Return the unit vector of a velocity; the unit vector of x at rest."""
+    """Return the unit vector of a velocity; at rest, the unit vector of x."""
     speed = math.hypot(*velocity)
     return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)
 
