@@ -3,42 +3,46 @@
 Spots of contact are taken as round. With S cell sides between points in contact and others, on n points of which a
 share A touches, their mean radius in cells is
 
-    r = (8/pi) min(A, 1 - A) n/S,
+    r = (8/pi) min(A, 1 - A) n/S.
 
-or the radius of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
-have the same position on the grid and count as one.
+If the gaps between the spots have the smaller area, r is the radius of the gaps. Contacts of waves, cylinders and flats
+are identical: they have the same position on the grid and count as one.
 
-The error of friction by the length of a time step is estimated in two ways. The first one is a formula. A linear step
-takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step, the force of a
-branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if it is fast, and
-is delayed by L/2 of a step,
+The error of friction by the length of a time step is estimated by a formula and by the embedded pair.
 
-    L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
+**Formula.** A linear step takes the displacement as linear in time. In a step a harmonic wave turns by an angle theta.
+The force of a branch with z = dt/tau then has an error, which is theta^2/12 of the loss of a slow branch and theta^2/6
+of the loss of a fast branch. The force is also delayed by L/2 of a step,
 
-In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w is a mean over the
-branches with w = G omega tau/(1 + (omega tau)^2), their shares of friction. theta is measured as the rms change of the
-displacement divided by the standard deviation of its heights, the angle by which a single wave turns. Shorter waves
-turn further and contribute more to friction: the error of many waves is MANY_WAVES times as large. Where contact spots
-of radius a pass by x = (distance of the step)/a, delayed forces move their edges:
+    L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large z.
+
+In full contact friction is the loss, with the error theta^2 (1 + <L>)/12. Here <L> = sum w L/sum w is a mean over the
+branches, whose weights w = G omega tau/(1 + (omega tau)^2) are their shares of friction. theta is measured as the rms
+change of the displacement divided by the standard deviation of the heights, which is the angle for a single wave.
+Shorter waves turn further and contribute more to friction: the error of many waves is MANY_WAVES times as large.
+
+If only spots of radius a are in contact, delayed forces move their edges. With x = (distance of the step)/a the error
+is
 
     E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
-A quadratic step also follows the bend of the motion. In full contact the relative error of its loss is
-k theta^2 <L> + theta^4/75 with k from 0.25 to 0.33 (`prony.discrete_modulus`), and again MANY_WAVES times as large for
-many waves. Edges leave an error of third
-order, PASSING x^3.
+A quadratic step also follows the bend of the motion. In full contact the relative error of the loss is then k theta^2
+<L> + theta^4/75, with k from 0.25 to 0.33 (`prony.discrete_modulus`), and again MANY_WAVES times as large for many
+waves. Edges of contact cause an error of third order, PASSING x^3.
 
-The second estimate is the embedded pair (`controller`), which shows jumps, changes of load, and creep. For a quadratic
-step it is the difference to a linear step. The pair of a linear step has a difference of second order in dt if all
-branches are slow, and of first order if some are fast; the accumulated error of linear steps has the order 1.7. While
-the surface slides, the estimate is the formula, but at least PAIR_SHARE times the estimate by the pair, which
-also shows errors that edges do not cause. Backward Euler is of first order: its error varies as the root of the
-difference.
+**Embedded pair.** The pair (`controller`) also shows jumps, changes of load, and creep. The estimate for a quadratic
+step is its difference to a linear step. The estimate for a linear step follows from its difference to backward Euler.
+This difference is of second order in dt if all branches are slow, and of first order if some branches are fast; the
+accumulated error of linear steps has the order 1.7. For steps of backward Euler, whose error is of first order, the
+estimate varies as the root of this difference.
 
-Friction that changes from step to step lags behind by at most <L> times the change; by CURVED_RISE <L> times the change
-in quadratic steps (`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic
-body, so that the next change is unknown. The error of the area is a share of the error of friction, and falls with the
-open area.
+While the surface slides, the estimate is that of the formula, but at least PAIR_SHARE times that of the pair, which
+also shows errors that edges do not cause. At rest the estimate is that of the pair.
+
+If friction changes from step to step, it is delayed. The error is at most <L> times the change of friction, and
+CURVED_RISE <L> times the change in quadratic steps (`error_of_rise`). Right after a jump of the load friction is 0 up
+to mesh errors, as for an elastic body, so that the next change is unknown. The error of the area is a fraction of the
+error of friction; the fraction becomes smaller as the share of the box that is not in contact falls.
 """
 
 import math
@@ -56,11 +60,12 @@ from ..physics.records import excess_of
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted constant; `order` is the power with which the error falls on refinement.
+    """A fitted constant. `order` is the power with which the error falls on refinement.
 
-    The script or test `found_by` judges it. `scatter` states the ratio of estimate to true error: its median and the
-    range of 90 % of the cases, as far as known. Ratios for friction and area belong to the sum of all sources, ratios
-    for the solver to its own part. The manual's page `coverage` shows how well all constants hold.
+    `found_by` is the script or test that compares the constant with true errors. `scatter` states the ratio of estimate
+    to true error: the median and the range of 90 % of the cases, as far as known. Ratios for friction and area belong
+    to the sum of all sources of error. Ratios for the solver belong to the error of the solver alone. The manual's page
+    `coverage` shows how well all constants hold.
     """
 
     name: str
@@ -146,13 +151,13 @@ class RunProperties:
 class StepObservation:
     """Numbers of a step, or of a steady state, from which errors are estimated.
 
-    * `complementarity`: a number of the solve's certificate;
+    * `complementarity`: the error of this name in the certificate of the solve (`physics.records.Certificate`);
     * `friction`, `interface`: the friction coefficient, and the part of it that the interface causes;
     * `area`, `corrected`: the counted and the corrected contact area, as shares of the box;
     * `slope`: rms slope of the surface, weighted by the pressure;
     * `penetrating`: number of points that penetrate without pressure, divided by the number in contact;
     * `spared`: share of the box left out of the correction of the area, since points on the edge have yielded;
-    * `straight`: 1 if all edges of contact follow one axis of the grid, 0 if they follow both equally;
+    * `straight`: 1 if all edges of contact follow one axis of the grid, 0 if they follow both axes equally;
     * `friction_mismatch`: friction by the slopes of the rigid surface minus friction by the slopes of the body;
     * `way`: direction of sliding, (0, 0) at rest.
 
@@ -194,13 +199,14 @@ class StepObservation:
 
     @cached_property
     def correction(self) -> float:
-        """The counted minus the corrected area, divided by the corrected area."""
+        """The counted area minus the corrected area, divided by the corrected area."""
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
 
 
 def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
-    """Return the properties of a run of a job. `shortest` is the shortest wave of its map [m], `folded` the bound on
-    the error of folded branches, and `prony` its relaxation function."""
+    """Return the properties of a run of a job. `shortest` is the shortest wave [m] of a measured map, or None. `folded`
+    is the bound on the error of folded branches. `prony` is the relaxation function of the body, None for an elastic
+    body."""
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [shortest] if shortest is not None else []
     (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
@@ -230,10 +236,12 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
-    """Return the mean radius of the spots of contact, or of the gaps between them if the gaps have the smaller area.
+    """Return the mean radius of the spots of contact, or of the gaps between the spots if the gaps have the smaller
+    area.
 
     The unit is the mean side of a cell. If edges follow the grid, the spots or gaps are strips, and the result is half
-    their mean width. Without edges it is infinity."""
+    their mean width. Without edges of contact the radius is infinite.
+    """
     sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
     if sides <= 0.0:
         return math.inf
@@ -242,8 +250,8 @@ def radius_of(run: RunProperties, observed: StepObservation) -> float:
 
 
 def count_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return the number of spots of contact, or of the gaps between them if these are smaller; 1 for identical
-    contacts; in full contact the number of half waves of the shortest length."""
+    """Return the number of spots of contact, or of the gaps between the spots if the gaps have the smaller area. In
+    full contact, return the number of half waves of the shortest length in the box. Identical contacts count as 1."""
     radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
     if run.identical_contacts:
         return 1.0
@@ -255,8 +263,13 @@ def count_spots(run: RunProperties, observed: StepObservation) -> float:
 
 
 def resolves(run: RunProperties, observed: StepObservation) -> bool:
-    """Return False if the true spots of contact may be smaller than a cell, so that the error of their area is unknown.
-    Many spots may be smaller than a single spot, since their errors average out, but not as small as single cells."""
+    """Return False if the true spots of contact may be smaller than a cell, so that the error of the contact area is
+    unknown.
+
+    A single spot must have a radius of ONE_RADIUS cells or more to be resolved. The mean radius of many spots may be as
+    small as MANY_RADIUS cells, since the errors of many spots average out. Contacts of half of the box or more are
+    always resolved.
+    """
     if not 0.0 < observed.area < 0.5:
         return True
     return radius_of(run, observed) >= (ONE_RADIUS if count_spots(run, observed) < 2.0 else MANY_RADIUS)
@@ -268,7 +281,8 @@ def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:
 
 
 def cell_along(run: RunProperties, way: Vector) -> float:
-    """Return the length of a cell along a direction, in the unit of `run.cell`; the longer side at rest."""
+    """Return the length of a cell along the direction `way`, in the unit of `run.cell`. At rest, return the longer side
+    of a cell."""
     (dx, dy), (x, y) = run.cell, way
     length = math.hypot(x, y)
     return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)
@@ -314,9 +328,9 @@ def _error_by_pair(observed: StepObservation) -> float:
 
 
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
-    """Return the relative error that a change of friction since the step before causes, as after rest: friction is
-    delayed by <L> of a step. After a jump the change is unknown; it is then estimated by the rms slope of the
-    surface times the sine of the body's loss angle times `uneven`."""
+    """Return the relative error of friction that a change of friction since the step before causes, such as a rise
+    after rest. Friction is delayed by <L> of a step. After a jump the change is unknown. It is then estimated as the
+    product of the rms slope of the surface, the sine of the body's loss angle, and `uneven`."""
     if run.prony is None or not run.exponential or not observed.slid or observed.body <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed), observed.angle)
@@ -339,7 +353,8 @@ def share_of_area(run: RunProperties, observed: StepObservation) -> float:
 
 
 def order_of_time_error(integrator: str, curved: bool) -> float:
-    """Return the power of the step length with which the time error grows; `curved`: u is quadratic in time."""
+    """Return the power of the step length with which the time error grows. `curved` is True if the displacement is
+    quadratic in time."""
     if integrator == "backward-euler":
         return 1.0
     return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order
