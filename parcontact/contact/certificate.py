@@ -1,5 +1,8 @@
-"""Computes how far a contact pressure is from the solution: sums over pressures and gaps, the length that gaps are
-divided by, and the errors in a `records.Certificate`."""
+"""The certificate of a contact pressure, which states how far the pressure is from the solution.
+
+A `records.Certificate` follows from sums over pressures and gaps. Gaps are divided by a reference length, so that the
+errors have no unit.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -49,16 +52,18 @@ class Lines:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Sums over a pressure p and its gap `g = u - h - d` at the approach d, with the displacement `u = A p`.
+    """Sums over a pressure p and its gap `g = u - h - d` at the approach d, with the displacement `u = A p`. `lowest`
+    is the lower bound of p.
 
     * load: sum of p over all points;
     * gaps: sum of p g over all points;
     * energy: half of the sum of p u over all points;
     * squares: sum of p u^2 over all points;
-    * free_load: sum of p less its lower bound, over points below the upper bound;
-    * free_gaps: sum of g times p less its lower bound, over the same points;
-    * between: lowest and highest d for which p meets all conditions of its bounds, if p is at a bound everywhere and
-      each bound has points; else None. If there is no such d, the first number exceeds the second.
+    * free_load: sum of `p - lowest` over points with p below the upper bound;
+    * free_gaps: sum of `(p - lowest) g` over the same points;
+    * between: None unless p is at a bound at every point and each bound is reached at some point. Otherwise the lowest
+      and the highest d for which p meets all conditions of its bounds. If there is no such d, the first number exceeds
+      the second.
     """
 
     d: float
@@ -93,8 +98,8 @@ class Iterate:
         return replace(self, d=d, gaps=gaps, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """Return the length that gaps are divided by in `Certificate`. It is at least LEAST_HEIGHT times `height` and
-        at most `height`, the height of the surface."""
+        """Return the reference length by which `Certificate` divides gaps. It is at least LEAST_HEIGHT times the
+        `height` of the surface, and at most this height."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least

@@ -1,4 +1,4 @@
-"""Fused loops over the rows of this rank: each reads every map once and returns partial sums for one Allreduce.
+"""Loops over the rows of this rank. Each loop reads every map once and returns partial sums for one Allreduce.
 
 Sums are taken in double precision, first along rows and then over rows, so that their rounding errors grow with nx + ny
 and not with nx ny.
@@ -75,8 +75,8 @@ def mark_working_set(p, u, h, d, lowest, highest, working):
 
 @loop
 def advance(p_old, t, step, lowest, highest, p):
-    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p, and the sum of the absolute changes
-    that the limits have made."""
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p, and the sum of the absolute changes of
+    p by these limits."""
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0

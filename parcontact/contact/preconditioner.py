@@ -1,12 +1,12 @@
 """The preconditioner of the contact solver: K with residuals extended beyond the contact.
 
-A preconditioner K is close to the inverse of A on the whole grid. It turns a residual r on a set c of points into the
-correction `R K R r` (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface
-outside c, too. With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is, and is the
-inverse of `R A R` if e = E r minimizes `<e, K e>`. At a distance from c this e varies over lengths of about the
-distance. The extension used here does so, too: it consists of means of r over cells of all sizes. With s the sum of r
-over a cell, w the number of points of c in the cell, and I the linear interpolation from the cells of the next coarser
-grid,
+A preconditioner K is close to the inverse of A on the whole grid. A residual r on a set c of points could be turned
+into the correction `R K R r`, where R restricts maps to c. But this correction takes r as 0 outside c, whereas the
+wanted correction moves the surface outside c, too. With an extension E of r to all points, `R E' K E R` is symmetric
+and positive, as K is, and is the inverse of `R A R` if e = E r minimizes `<e, K e>`. At a distance from c this e varies
+over lengths of about that distance. The extension used here also varies over such lengths: it consists of means of r
+over cells of all sizes. With s the sum of r over a cell, w the number of points of c in the cell, and I the linear
+interpolation from the cells of the next coarser grid,
 
     e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
@@ -163,7 +163,8 @@ class CellLevel:
     between cells, and the transposes of both.
 
     Maps hold the rows of this rank. `known` holds the weights of the module: interpolation does not change a point with
-    the weight 1. `add_up` and `interpolate_back` replace their last argument, the other methods add to it. Collective.
+    the weight 1. `add_up` and `interpolate_back` replace the map in their last argument. The other methods add to the
+    map in their last argument. All methods are collective.
     """
 
     step: regrid.PyramidStep

@@ -1,4 +1,5 @@
-"""The problem of a contact solve (operators, control, bounds of pressures), and a solve's memory, precision and result.
+"""The problem of a contact solve: operators, control and bounds of pressures. Also the result of a solve, its maps and
+its precision.
 
 `Box` bounds the pressure, for contact without adhesion (p >= 0), for a counterbody that yields at its hardness H (0 <=
 p <= H), or for a gap that holds a fluid of pressure q (p >= q):
@@ -51,11 +52,11 @@ class Constraint(Protocol):
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
         """Solve `p + gamma c(p) = s + gamma h` at each point, limit p to its bounds, and put `2 p - s` into
-        `reflected`. Return the sum of `reflected` on this rank. s is the map of `splitting`, and gamma its parameter
-        [pressure/length]."""
+        `reflected`. Return the sum of `reflected` on this rank. s is the map that `splitting` iterates, and gamma is
+        the parameter of `splitting` [pressure/length]."""
 
     def add_closing(self, u: Array, p: Array) -> Array:
-        """Return `u + c(p)`; the map u itself if there is no closing."""
+        """Return `u + c(p)`. Without a closing, return the map u itself."""
 
     def in_units(self, pressure: float, length: float) -> "Constraint":
         """Return the constraint in the given units of pressure and length."""
@@ -102,8 +103,9 @@ SNAP = 1e-12  # accuracy: pressures within this share of the range of a bound ar
 def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> None:
     """Scale an admissible p from its sum `load` to the wanted sum `total`; collective.
 
-    At points below the upper bound, p less its lower bound is scaled. If these points cannot carry `total`, p is
-    replaced by a weighted mean of p and a bound. If p is at its lower bound everywhere, p becomes uniform.
+    At points below the upper bound, the difference between p and the lower bound is scaled. If these points cannot
+    carry `total`, p is replaced by a weighted mean of p and a bound. If p is at its lower bound everywhere, p becomes
+    uniform.
     """
     even, span = box.lowest * slab.points, box.highest - box.lowest
     if load <= even * (1.0 + slab.points * np.finfo(np.float64).eps):
@@ -367,10 +369,11 @@ def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compli
 
 
 class Workspace:
-    """A pressure, two displacements, a search direction, and one byte per point for the working set.
+    """The maps that all solvers of a run share: a pressure, two displacements, a search direction, and the working set
+    with one byte per point.
 
-    All solvers of a run share one workspace. A solve overwrites all maps and leaves `A p` in `displacement`, valid
-    until the next solve. Read maps as attributes at each use: they may be swapped or replaced.
+    A solve overwrites all maps and leaves `A p` in `displacement`, valid until the next solve. The attributes must be
+    read anew at each use, since a solve may swap or replace the maps.
 
     Parameters:
 

@@ -1,10 +1,11 @@
 """Projected steps for operators that need not be symmetric, in light contact and free boxes.
 
-Steps that minimize the residual, each projected onto the admissible pressures. On the working set c (pressure or
-penetration) of an admissible pressure x, a step combines the preconditioned residual t and the last two changes of x so
-that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean over c). Then negative
-pressures are put to 0, x is scaled to the load, and A is applied to x, so that the image of each stored change is
-exact. Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
+A step minimizes the residual and is then projected onto the admissible pressures. The working set c of an admissible
+pressure x consists of the points with pressure or penetration. On c a step combines the preconditioned residual t and
+the last two changes of x so that the sum of squares of `C R (A x - h)` is smallest. Here R restricts a map to c, and C
+subtracts the mean over c. Then negative pressures are put to 0, x is scaled to the load, and A is applied to x, so that
+the image of each stored change is exact. Convergence is not guaranteed: a solve is given up when its certificate no
+longer halves.
 
 In a free box (`FreeSteadySolver`) the method of proximal points follows if projected steps do not converge. The symbol
 of the padded box has a negative real part at some waves, so that the resolvents of `splitting` may not exist. Then the

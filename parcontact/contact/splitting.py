@@ -83,7 +83,7 @@ class Acceleration:
         return math.sqrt(square / self.slab.points)
 
     def advance(self, s: Array, plain: bool) -> None:
-        """Replace s by the next iterate; `plain` switches acceleration off."""
+        """Replace s by the next iterate. If `plain` is True, the step is not accelerated."""
         theta = _smallest(self._gram, self._against, 0 if plain else self._count)
         self._last = (self._last + 1) % DEPTH
         _advance(s, self.f, self._ds, self._df, theta, self._last)

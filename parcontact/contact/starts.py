@@ -19,8 +19,8 @@ operator of the whole grid checks the pressure, and the solve continues on the w
 sends the result to all ranks.
 
 A failed solve is repeated with an operator in double precision, from a cold start on nested grids, and by an active set
-(`solve_by_sets`). A solve that succeeds does nothing for these attempts. The attempts depend on the failed solve alone,
-so that all ranks make the same attempts, and a repeated run repeats them.
+(`solve_by_sets`). These attempts cost nothing while solves succeed. The attempts depend on the failed solve alone, so
+that all ranks make the same attempts, and a repeated run repeats them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -60,7 +60,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """Anything with a `slab`. `descend` needs the slab of each level."""
+    """An object with the `slab` of a grid, such as a level in `descend`."""
 
     @property
     def slab(self) -> Slab: ...
@@ -163,7 +163,8 @@ def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles:
 
 
 class OnTheseTiles:
-    """A problem on tiles of a grid, and its solution. Only root has the operators."""
+    """A contact problem on tiles of a grid. Its methods solve the problem and check the solution. Only root has the
+    operators on the tiles."""
 
     def __init__(self, tiles: Tiles, solver_on: SolverOnTiles, problem: Problem, slab: Slab, height: float) -> None:
         self._tiles, self._solver_on, self._problem, self._slab = tiles, solver_on, problem, slab
