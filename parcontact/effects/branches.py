@@ -116,8 +116,8 @@ def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """The branches of a material that have a map (`kept`), and those that have none (`memoryless`, `frozen`), by their
-    numbers in the material.
+    """Which branches of a material have a map: `kept` has the numbers of branches with a map, `memoryless` and `frozen`
+    the numbers of branches without one.
 
     All branches without a map together cause a relative error of at most `bound`, which is at most `allowed`. This is
     an error of friction if the surface slides, else an error of the modulus. `memoryless_errors` are the errors that

@@ -200,7 +200,7 @@ class ContactLaw(Protocol[Memory]):
         """Return the checkpoint entries of a memory, by name."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory that a checkpoint holds."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`."""
 
 
 EXTRAPOLATION, TOLERANCES = "extrapolated starts", "looser tolerances"  # see `Effect.forbids`
@@ -245,9 +245,9 @@ class Instant:
     valid until the next step.
 
     The pressure is the number `modulus` times the map `pressure`. `displacement` is the displacement of the body, and
-    `touching` is not 0 where the surfaces touch. `before` are the measures before the step, and `measures` those after
-    it. In the step the surface moved by the vector `moved` [m]. `gained` [J] is the change of the sum of stored and
-    dissipated energy of the body, NaN if energies are not computed. `front` and `untouched` are as in `EdgeMotion`.
+    `touching` is not 0 where the surfaces touch. `before` and `measures` are the measures before and after the step. In
+    the step the surface moved by the vector `moved` [m]. `gained` [J] is the change of the sum of stored and dissipated
+    energy of the body, NaN if energies are not computed. `front` and `untouched` are as in `EdgeMotion`.
     `error_friction` is the estimated relative error of friction, infinite without friction.
     """
 
@@ -332,7 +332,7 @@ class Effect(Protocol[Memory]):
     @staticmethod
     def decide(job: Any) -> Decision:
         """Return the decision whether the job turns the effect on. The `name` of the decision is the effect's name in
-        checkpoints. All ranks must return the same."""
+        checkpoints. All ranks must return the same decision."""
         ...
 
     @staticmethod
@@ -431,7 +431,7 @@ class Effect(Protocol[Memory]):
 
     def error_energy(self, memory: Memory) -> float | None:
         """Return the error of the energies since the start [J]; None if the usual estimate for energies under pressure
-        holds."""
+        is right."""
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
@@ -444,8 +444,8 @@ class Effect(Protocol[Memory]):
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory that a checkpoint holds. Numbers in `saved` are arrays in the run's units. The maps of
-        `entries` have already been filled with the saved maps."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`. Numbers in `saved`
+        are arrays in the run's units."""
         return memory
 
 

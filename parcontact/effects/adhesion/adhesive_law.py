@@ -5,8 +5,8 @@ last two gaps, extrapolated in time and moved with the surface by whole cells.
 
 The solver of gaps (`gap_solver`) needs the inverse of its operator. `AdhesiveSolver` extends it to a free body, whose
 operator A the FFT does not invert. A is replaced by the operator B of a periodic body with the same Green's function up
-to half the box (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A -
-B) p` with the p of the pass before. One or two passes are usual.
+to half the box (`HalfSpace.gap_operators`), and the pressure p of the pass before gives the difference: each pass
+solves for the heights `h - (A - B) p`. One or two passes are usual.
 
 A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
 state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
@@ -511,7 +511,7 @@ class AdhesiveLaw:
         return {**found, "free correction": Entry(memory.free_correction, units.height, "m")}
 
     def restored(self, memory: AdhesiveMemory, saved: Saved) -> AdhesiveMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`."""
         now, before = (
             PastGap(past.gap, _place(saved[f"{age}position"]), bool(saved[f"{age}gap is known"]))
             for age, past in zip(("", "earlier "), memory.pasts, strict=True)

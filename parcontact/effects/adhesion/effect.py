@@ -319,7 +319,7 @@ class AdhesiveEnergies(NamedTuple):
     """Energies [J] since the start of a run with adhesion.
 
     `work` is the work that the rigid surface has done. `surfaces` is the energy of the attraction, 0 at large gaps and
-    negative at small ones. `lost` is the energy lost in snaps. `error` is the error of these energies: the differences
+    negative at small gaps. `lost` is the energy lost in snaps. `error` is the error of these energies: the differences
     between work and energies in all steps without a snap, and the error of the dissipated energy by the mesh.
     """
 

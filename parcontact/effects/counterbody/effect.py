@@ -188,7 +188,7 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def why_no_curve(job: Any) -> str:
-        """Return the reason why a job has no friction curve; '' if it has one."""
+        """Return the reason why a job has no friction curve; '' if the job may have one."""
         if job.steady is not None or not job.counterbody.fitted.remembers:
             return ""
         return f"with a counterbody that relaxes the job needs a steady section in place of its history: {AT_REST}"

@@ -286,8 +286,8 @@ class ThermalColumns(Effect[ThermalMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries; collective. Each spectrum is saved as a map. A map cannot hold all columns of
-        a spectrum: further maps hold the other columns."""
+        """Return the checkpoint entries; collective. Each spectrum is saved as a map. A spectrum has more columns than
+        a map, so that further maps have the other columns."""
         known, depths = memory.heat.sum, memory.depths
         found = {
             "rise": Entry(memory.rise, 1.0, "K"),
@@ -319,8 +319,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory that a checkpoint holds; collective. If the job has shorter steps than the run that wrote
-        the checkpoint, the memory gets further waves of temperature, which start at 0."""
+        """Return the memory of a checkpoint; collective. If the job has shorter steps than the run that wrote the
+        checkpoint, the memory gets further waves of temperature, which start at 0."""
         per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

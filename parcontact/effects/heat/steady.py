@@ -99,9 +99,9 @@ def find_temperatures(
 
 
 class Feedback:
-    """Search for the flash temperature with feedback: rubber that relaxes at this temperature is warmed to it by its
-    own heat. The first round is for cold rubber. If only the velocity differs from that of the last state, the second
-    round starts from the flash temperature of that state."""
+    """Search for the flash temperature with feedback: rubber that relaxes at this temperature is warmed to this
+    temperature by its own heat. The first round is for cold rubber. If only the velocity differs from that of the last
+    state, the second round starts from the flash temperature of that state."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)

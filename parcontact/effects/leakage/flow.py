@@ -528,8 +528,8 @@ class PressureDrop:
         """Return the equivalent gaps [m] of a gas at a `pressure` [Pa], in the shape of `gap`; for a liquid, return
         `gap`.
 
-        A gas at this pressure slips in a gap. If it had the mean pressure of the drop and did not slip, the same
-        pressure gradient would drive the same mass flow through the equivalent gap.
+        A gas at this pressure slips in a gap. The same pressure gradient would drive the same mass flow through the
+        equivalent gap if the gas had the mean pressure of the drop and did not slip.
         """
         if not (path := self.mean_free_path):
             return gap

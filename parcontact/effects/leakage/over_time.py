@@ -331,8 +331,8 @@ class Gaps:
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None, curves: Sequence[LoadCurve] = ()) -> LeakInstant:
         """Return the row of leak.csv for an instant. `bare` is the flow under the undeformed surface, None if it is
-        unknown. `curves` are the conductivities over the load along x and along y; they are given if the fluid carries
-        a part of the load."""
+        unknown. If the fluid carries a part of the load, `curves` are the conductivities over the load along x and
+        along y."""
         found, row = solved.leak, {name: self._measured(index, name) for name in LeakInstant._fields[1:3]}
         totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
         along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))

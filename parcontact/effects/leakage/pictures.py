@@ -41,7 +41,7 @@ def conductivity_panel(
     is too narrow for continuum flow.
 
     K is 0 where contact closes the gap, and NaN where it is not known. Conductivities in `dotted` are drawn as dotted
-    lines, in the colours of those in `flows`.
+    lines, with colours in the same order as those of `flows`.
     """
     lines, thin = list[Line](), list[Line]()
     for number, (name, flow) in enumerate(flows.items()):
@@ -123,7 +123,8 @@ def panel_of(rows: Sequence[Any], over: str) -> Panel:
     """Return the panel of K against `over`, which is pressure or time. If `over` is '', K is drawn against time if
     successive instants have the same pressure, else against pressure.
 
-    If the pressure stays constant over several instants, the panel against pressure shows only the last one of them.
+    If the pressure stays constant over several instants, the panel against pressure shows only the last of these
+    instants.
     """
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
     pressure, time = columns["pressure"], columns["time"]

@@ -63,8 +63,8 @@ def sentences(run: Results) -> list[str]:
 
 
 def said_at_end(run: Results) -> Iterator[str]:
-    """Yield sentences on the pressures at which a fluid that carries a part of the load opens the seal, closes it, and
-    lifts it off, and on the last leak and its errors."""
+    """Yield sentences for a fluid that carries a part of the load. They state the pressures at which the seal opens,
+    closes and lifts off, and the last leak with its errors."""
     columns = run.table
     if "high_pressure" not in columns:
         return
@@ -99,7 +99,7 @@ def _describe_leak(columns: Columns, row: int) -> str:
 
 def exported(run: Results) -> list[ExportedTable]:
     """Return tables for other programs: the known conductivities by load. If a load occurs in several rows, the last
-    one counts. There are none if the fluid carries a part of the load."""
+    row counts. The list is empty if the fluid carries a part of the load."""
     columns = run.read(TABLE) or run.table
     names = [name for name in EXPORTED if name in columns]
     flows = () if "high_pressure" in columns else columns.get("flow_x", ())

@@ -25,8 +25,8 @@ from 1 to 0:
 The flow of each round gives another map of s. Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) finds the map
 for the next round from this round and the `DEPTH` rounds before it. Near percolation, pools open and close again.
 Therefore, after `ANDERSON` rounds, each cell changes its s by a part of the difference of both maps only, and this part
-is halved whenever the difference changes its sign. If the rounds have not settled after `EACH` of them, they go on with
-an eps that is `GROWTH` times as large, and begin again with Anderson's method.
+is halved whenever the difference changes its sign. If the flow has not settled after `EACH` rounds, eps is multiplied
+by `GROWTH`, and the rounds begin again with Anderson's method.
 """
 
 from __future__ import annotations
@@ -244,10 +244,10 @@ OPEN = 1e-30  # rounding: least open gap [m], as contact has the gap 0
 class SealMemory:
     """Memory of a seal after a step.
 
-    `share` is the map of the share s of the pressure drop, and `gap` the map of the gap [m], 0 in
-    contact. `spare` holds two maps for the next step. `pressures` are the high and the low pressure of the fluid [Pa],
-    and `modulus` is the modulus of the body in the step; these are 0 before the first step. `flows` is True if the
-    share is known. `end` has the time and the load at which the seal lifted off, None if it has not.
+    `share` is the map of the share s of the pressure drop, and `gap` the map of the gap [m], 0 in contact. `spare`
+    holds two maps for the next step. `pressures` are the high and the low pressure of the fluid [Pa], and `modulus` is
+    the modulus of the body in the step; these are 0 before the first step. `flows` is True if the share is known. `end`
+    has the time and the load of the lift-off; it is None as long as the seal has not lifted off.
     """
 
     share: Array
@@ -426,7 +426,7 @@ class SealLaw:
         }
 
     def restored(self, memory: SealMemory, saved: Saved) -> SealMemory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`."""
         high, low = saved["pressures"].tolist()
         known, flows = float(saved["modulus"]), bool(saved["flows"])
         end = end_in(self.scene.job, saved)

@@ -21,9 +21,9 @@ its `target`: its last displacement plus the increment of D. With the map m of `
 
     e = g + m/alpha,    w = e - A t = g - u.
 
-Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
-and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
-step. A point without contact has g = u, so that its slip counts from its first contact.
+Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to these
+points, and nothing is shifted. The surface moves over the points. The bounds f move with the surface, as they follow
+from the pressure of each step. A point without contact has g = u, so that its slip counts from its first contact.
 
 The residuals of solves must not add up over many steps. So the target g of a point that sticks stays as it is, and is
 not set to the displacement u of the solution. The target of a point that slips contains the difference between its
@@ -92,7 +92,8 @@ class BoundedTraction(NamedTuple):
 
 @dataclass(frozen=True)
 class StickMemory:
-    """Memory of stick and slip. Maps are in the run's units, and have two stacked components except those of bounds.
+    """Memory of stick and slip. Maps are in the run's units. Maps of tractions and displacements have two stacked
+    components, maps of bounds have one.
 
     `body` is the memory of the displacements along the surface. `last` has the tractions and the bounds of the last
     step, divided by the modulus `alpha` of that step. `spare` has the maps for the tractions and bounds of the next
@@ -142,8 +143,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
 
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
-        """Return the changes after a step: the new tractions, in the maps of `memory`, and what follows from them;
-        collective."""
+        """Solve for the tractions of a step, in the maps of `memory`, and return the changes that follow from these
+        tractions; collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
         (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
         way = along * x - across * y, along * y + across * x
@@ -259,7 +260,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: StickMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries. A map with two components has an entry for each of them."""
+        """Return the checkpoint entries. A map with two components has an entry for each component."""
         pressure = units.height / units.length
         both = {
             "traction": Entry(memory.last.traction, pressure),
@@ -279,7 +280,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return found
 
     def restored(self, memory: StickMemory, saved: Saved) -> StickMemory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`."""
         joined = {name.removesuffix(" x"): value for name, value in saved.items()}
         energy = memory.energy
         if self._energy is not None and energy is not None:

@@ -161,8 +161,8 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
     """Put one component of the residual into the map r: the component along x if `along_x`, else along y.
 
     The residual of a point that sticks is its slip w. That of a point that slips is the part of w across its traction,
-    times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`: those that
-    stick, and slipping points with a traction that is sufficiently across the axis. Elsewhere r is 0.
+    times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`: points that
+    stick, and slipping points whose traction is sufficiently across the axis. Elsewhere r is 0.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
@@ -182,7 +182,7 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
 def complete(
     bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, mean_x, mean_y, z_x, z_y
 ):
-    """Complete the direction z from the preconditioned residual, which the maps of z hold.
+    """Complete the direction z from the preconditioned residual, which is in the maps (z_x, z_y).
 
     (mean_x, mean_y) is added to z at points that stick. At points that slip the part of z across the traction is
     multiplied by the root of `share = short/(short + turn)`, and `(1 - share)/(long + turn)` times the slip across the
@@ -225,11 +225,12 @@ def complete(
 
 @loop
 def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
-    """Put the next tractions into the maps (new_x, new_y), which hold the tractions of the iteration before (x, y).
+    """Put the next tractions into the maps (new_x, new_y), which at first contain the previous tractions. (x, y) are
+    the present tractions.
 
-    The next tractions are (x, y) plus `step` times z plus `again` times the last change. Then the tractions of points
-    that slip get the length of their bounds, and other tractions that are longer than their bounds are shortened to
-    them. Return the sum of the magnitudes of all changes.
+    The next tractions are (x, y) plus `step` times z plus `again` times the last change, from the previous to the
+    present tractions. Then the tractions of points that slip get the length of their bounds, and other tractions that
+    are longer than their bounds are shortened to these bounds. Return the sum of the magnitudes of all changes.
     """
     change = 0.0
     for j in range(bound.shape[0]):
@@ -291,7 +292,7 @@ Vector = tuple[float, float]
 
 def stacked(slab: Slab) -> Slab:
     """Return the slab of maps that stack two components: each rank has its rows of the first component, and then the
-    same rows of the second one."""
+    same rows of the second component."""
 
     def twice(rank: int) -> slice:
         rows = slab.rows_of(rank)
@@ -404,7 +405,7 @@ Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t 
 class TractionProblem(NamedTuple):
     """Input of a solve. `bound` is the map of the bounds f. `aim` is the map of the displacements e at which points
     that stick end, with stacked components. `kappa` is a stiffness of the contact, in the unit of tractions divided by
-    the unit of displacements. `tolerance` is that of the certificate."""
+    the unit of displacements. `tolerance` is the largest certificate of a solution."""
 
     bound: Array
     aim: Array
@@ -414,9 +415,9 @@ class TractionProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class Tractions:
-    """Result of a solve. The tractions t replace those in the map from which the solve started. The map `displacement`
-    has A t; it belongs to the solver and is valid until the next solve. `failure` is empty, or states why the tolerance
-    was not reached."""
+    """Result of a solve. The map from which the solve started contains the tractions t. The map `displacement` has A t;
+    it belongs to the solver and is valid until the next solve. `failure` is empty, or states why the tolerance was not
+    reached."""
 
     displacement: Array
     certificate: float
