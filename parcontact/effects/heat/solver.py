@@ -171,15 +171,15 @@ def sliding_heat(
     reach = body.diffusivity * time
 
     def part(rows: slice) -> Spectrum:
-        beta = np.sqrt(body.squared_beta(fft, size, velocity, rows))  # the root with a positive real part
+        beta: Spectrum = np.sqrt(body.squared_beta(fft, size, velocity, rows))  # its real part is positive
         mean = beta == 0.0
         beta[mean] = 1e-9 / max(size)
-        if depths is None:
+        if depths is not None:
+            symbol = depths.warmed(beta, felt, reach)
+        else:
             from scipy.special import erf
 
             symbol = (erf(beta * np.sqrt(reach)) if reach < np.inf else 1.0) / beta
-        else:
-            symbol = depths.warmed(beta, felt, reach)
         if time == np.inf:
             symbol[mean] = 0.0
         return symbol / body.conductivity

@@ -147,7 +147,8 @@ def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, f
     ring, least, shown = list[Line](), 2.0, np.full_like(gap, np.nan)  # without a path no bar of colours
     if flow.position is not None:
         cell = zip(flow.position[::-1], size, gap.shape[::-1], strict=True)
-        ring.append(Line("", *(np.array([(k + 0.5) * length / n]) for k, length, n in cell), RING))
+        x, y = (np.array([(k + 0.5) * length / n]) for k, length, n in cell)
+        ring.append(Line("", x, y, RING))
         most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
         least, shown = 10.0**-DECADES, flux / most
     where = (0.0, size[0], 0.0, size[1])
