@@ -5,17 +5,19 @@ across the sliding direction.
 
 The mesh causes two kinds of errors, both at edges of contact. Systematic errors grow with the phase of the modulus,
 because the pressure at one edge of a spot is steeper than at the other. Random errors come from the positions of edges
-between points. If a share A of the surface is in contact, their relative standard deviation in a square with sides of
-one shortest wave is ((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 such squares.
-`friction_error` and `area_error` are sums of both kinds, with SURE standard deviations of the random errors and of the
-differences of systematic errors between surfaces.
+between points. Consider a square whose sides are as long as the shortest wave. If the share A of the surface is in
+contact, random errors in this square have the relative standard deviation ((1 - A)/A)^0.5. A box with N shortest waves
+along a side has N^2 such squares.
 
-The constants were fitted by maximum likelihood to steady states of rough surfaces, with the share in contact and the
-phase that `march.mesh` guesses. Between 1 and 100 % of these surfaces were in contact, and 12 or 24 shortest waves lay
-along a side; a surface with fewer waves is treated as one with 12. There were 36 states for friction, each on about 110
-meshes, and 24 states for the area, each on about 40 meshes; the references had 160 cells per shortest wave.
+`friction_error` and `area_error` add both kinds of errors. The random errors, and the differences of systematic errors
+between surfaces, are taken at `SURE` standard deviations.
+
+The constants were fitted by maximum likelihood to steady states of rough surfaces. The share in contact and the phase
+were those that `march.mesh` guesses. Between 1 and 100 % of these surfaces were in contact, and 12 or 24 shortest waves
+lay along a side; a surface with fewer waves is treated as a surface with 12. There were 36 states for friction, each on
+about 110 meshes, and 24 states for the area, each on about 40 meshes; the references had 160 cells per shortest wave.
 `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is hypot(x dx, y dy)
-long. Without sliding both axes are treated as along the sliding direction.
+long. If the surface does not slide, x and y are both treated as sliding directions.
 
 Warnings about physics are in `meaning.py`, about memory in `limits.py`.
 """
@@ -86,12 +88,12 @@ SAME_LENGTH = 1e-9  # rounding: relative difference below which numbers are the 
 
 
 class Guess(NamedTuple):
-    """A guess of the contact before it is solved.
+    """A guess of the contact before the contact is solved.
 
-    `share` is the share of the surface in contact. `phase` is the phase of the modulus, over 90 degrees, at the
-    frequency at which edges of contact pass. `waves` is the number of shortest waves along a side of the box. `slow` is
-    1 for sliding far below all frequencies of the body, where edges lose power in waves shorter than the cells, and 0
-    for fast sliding.
+    `share` is the share of the surface in contact. `phase` is the phase of the modulus at the frequency at which edges
+    of contact pass, divided by 90 degrees. `waves` is the number of shortest waves along a side of the box. `slow` is 1
+    if the surface slides far below all frequencies of the body, so that edges lose power in waves shorter than the
+    cells, and 0 if it slides fast.
     """
 
     share: float
@@ -101,20 +103,22 @@ class Guess(NamedTuple):
 
     @property
     def spread(self) -> float:
-        """Return the relative standard deviation of the contact area at one place."""
+        """Return the relative standard deviation of the contact area in a square whose sides are as long as the
+        shortest wave."""
         return math.sqrt((1.0 - self.share) / self.share)
 
     @property
     def few(self) -> float:
-        """Return the random errors over those of a box with FEW shortest waves along a side; at most 1."""
+        """Return the factor on random errors: 1 for a box with at most `FEW` shortest waves along a side, and less for
+        a larger box, in proportion to 1 over the number of these waves."""
         return FEW / max(self.waves, FEW)
 
 
 def friction_error(c: float, across: float, guess: Guess) -> float:
-    """Return the relative error of friction below which nine of ten surfaces stay.
+    """Return a bound on the relative error of friction by the mesh. The error of nine of ten surfaces is smaller.
 
-    `c` and `across` are the numbers of cells per shortest wave along and across the sliding direction. Slow sliding
-    adds the power that is lost in waves shorter than the cells.
+    `c` and `across` are the numbers of cells per shortest wave along and across the sliding direction. In slow sliding,
+    the power that is lost in waves shorter than the cells is added.
     """
     along = (4.0 / c) ** 1.5
     steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
@@ -125,9 +129,10 @@ def friction_error(c: float, across: float, guess: Guess) -> float:
 
 
 def area_error(c: float, across: float, guess: Guess) -> float:
-    """Return the relative error of the contact area, corrected for cells at its edges, below which nine of ten surfaces
-    stay; the arguments are those of `friction_error`. Errors remain as the correction is too large for elastic bodies,
-    and too small for viscoelastic bodies at edges across the sliding direction."""
+    """Return a bound on the relative error of the contact area by the mesh, after the area was corrected for cells at
+    its edges. The error of nine of ten surfaces is smaller. The correction is too large for elastic bodies. For
+    viscoelastic bodies it is too small at edges across the sliding direction. The arguments are those of
+    `friction_error`."""
     along, aside = 4.0 / c, 4.0 / across
     known = 0.067 * guess.phase * along - 0.005 * (along + aside)
     chance = guess.few * 0.0078 * math.hypot(along**1.2, 0.7 * aside**1.6)
@@ -140,12 +145,13 @@ def one_cell(stage: Stage, grid: Grid) -> float:
 
 
 def along(way: Vector, length: float, grid: Grid) -> float:
-    """Return the length of a cell [m] along the direction of the vector `way`, which has the length `length`."""
+    """Return the length of a cell [m] along the direction of the vector `way`. `length` is the magnitude of this
+    vector."""
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
 def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
-    """Return True if a grid resolves a wave, in any direction, between the `shortest` and the `longest` wavelength
+    """Return True if a grid resolves any wave, in any direction, whose wavelength is between `shortest` and `longest`
     [m]."""
     least, most = (1 - SAME_LENGTH) / longest, (1 - SAME_LENGTH) / shortest
     rows = (grid.ny - 1) // 2
@@ -170,9 +176,9 @@ def cells_for_area(accuracy: float) -> float:
 
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
-    """Return the cells per shortest wave along an axis (0 for x, 1 for y) that friction, and that the contact area,
-    needs for the accuracies `asked`. The surface slides along `directions` (unit vectors); without any, both numbers
-    are those of the area."""
+    """Return two numbers of cells per shortest wave along an axis (0 for x, 1 for y): those that friction and the
+    contact area need for the accuracies `asked`. The surface slides along `directions` (unit vectors). If it does not
+    slide, both numbers are those that the area needs."""
     if not directions:
         return cells_for_area(asked.area), cells_for_area(asked.area)
     if any(abs(way[axis]) > ASIDE for way in directions):
@@ -303,8 +309,8 @@ WARN_LARGE_BOX = Kind(
 
 
 def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
-    """Yield a warning about a box whose length is MOST_LONG_WAVES times the longest wave of a shape or more; `index` is
-    the place of the shape in the list of the surface."""
+    """Yield a warning if the box is longer than `MOST_LONG_WAVES` times the longest wave of a shape. `index` is the
+    place of the shape in the list `surface`."""
     length = max((length for _, length, _ in _directions(grid)), default=0.0)
     if length > MOST_LONG_WAVES * shape.long_wavelength:
         of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}

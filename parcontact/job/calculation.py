@@ -134,8 +134,9 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """Return the relative error of friction that time steps may cause. Steps cause at most a quarter of this error
-        in the area, so that the accuracy of the area limits it, too."""
+        """Return the relative error of friction that time steps may cause. The relative error of the area that steps
+        cause is at most a quarter of their error of friction, so that also the accuracy of the area limits the returned
+        value."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 
@@ -146,8 +147,8 @@ def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
 
 
 class Numerics(Part):
-    """Settings of the solution. The values of `tolerance` and `branch_error`, if they are not given, and the mesh of
-    `points: auto` follow from `accuracy`."""
+    """Settings of the solution. The accuracy determines the mesh of `points: auto`, and the values of `tolerance` and
+    `branch_error` if the job does not give them."""
 
     accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
         Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1, or {friction, area}")
@@ -232,7 +233,7 @@ class Checkpoint(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Return the keys of the section; without an interval, with one of 10 minutes."""
+        """Return the keys of the section. If the section gives no interval, an interval of 10 minutes is added."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 
 
@@ -246,8 +247,8 @@ def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 class Study(Part):
-    """Values that `parcontact study` compares: a list of values of a setting is a ladder. A setting without a ladder
-    keeps the value of the job."""
+    """Settings whose values `parcontact study` compares. A list of values is the ladder of a setting. A setting without
+    a ladder keeps the value of the job."""
 
     mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of positive whole numbers of points along x"

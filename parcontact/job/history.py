@@ -46,9 +46,9 @@ class Bounds:
 
 
 def most_cells(job: Sections) -> int:
-    """Return the largest number of cells by which the surface may slide in a step: the largest power of two up to a
-    quarter of the shortest wave; 1 if a quarter wave is shorter than a cell, or if waves are not known, as of a file of
-    heights."""
+    """Return the largest number of cells by which the surface may slide in a step. This is the largest power of two for
+    which the step is not longer than a quarter of the shortest wave. It is 1 if a quarter of this wave is shorter than
+    a cell, or if the waves are not known, for example because the heights come from a file."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
     for shape in job.surface:
@@ -62,8 +62,8 @@ def most_cells(job: Sections) -> int:
 
 
 def longest_change(stage: Stage) -> float:
-    """Return the longest step [s] in which a ramp of the load, or the phase of an oscillation, changes little enough;
-    the length of the stage if it has neither."""
+    """Return the longest step [s] in which a ramp of the load, or the phase of an oscillation, changes little enough.
+    Return the length of the stage if its load is constant."""
     if stage.frequency:
         return 1.0 / (CYCLE_STEPS * stage.frequency)
     return stage.seconds if stage.constant else stage.seconds / RAMP_STEPS
@@ -103,7 +103,7 @@ class StepLadder:
         return self.doublings + math.ceil(self.seconds / top * (1.0 - SAME_TIME))
 
     def end(self, index: int) -> float:
-        """Return the end of step `index`, counted from 1 [s]; 0 is the start."""
+        """Return the end of step `index` [s after the first step began]. Steps are counted from 1."""
         if index <= 0:
             return 0.0
         doubled = min(index - 1, self.doublings)
@@ -112,11 +112,12 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class ChosenEnds:
-    """Ends of the chosen steps of a stage: of the steps `made` [s after the start of the stage], then of the estimated
-    steps `ladder`.
+    """Ends of the steps of a stage whose steps are chosen. The first steps have been made, with the ends `made` [s
+    after the start of the stage]; the further steps are estimated by `ladder`.
 
     `stops` [s after the start of the stage] are the end of the stage and, if the run continues beyond it, the end of
-    the run. In oscillations a step also ends with each `part` of a cycle [s], which is 0 without oscillation.
+    the run. If the load or the velocity oscillates, a step ends also after each `part` of a cycle [s]; `part` is 0
+    without oscillation. `limits` are the shortest and the longest length of a step.
     """
 
     made: Sequence[float]
@@ -145,7 +146,8 @@ class ChosenEnds:
         return self.stops[-1] if index >= self.count else now + self.ladder.end(index - len(self.made))
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return the length of step `index` [s], or of all steps after step `since`."""
+        """Return the length of step `index` [s], or the length of all steps after step `since` up to the end of step
+        `index`."""
         return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
 
     def __getitem__(self, index: int) -> float:
@@ -164,9 +166,9 @@ class MadeStep(NamedTuple):
 
 @dataclass
 class ChosenSteps:
-    """The steps chosen so far: `ends` has the ends of the steps of each stage [s after the start of the stage], by the
-    number of the stage; `next` is the length of the next step [s], 0 before it is decided. The surface slides by at
-    most `cells` cells in a step."""
+    """The steps chosen so far. `ends` maps the number of a stage to the ends of its steps [s after the start of the
+    stage]. `next` is the length of the next step [s], 0 as long as it is not decided. In a step the surface slides by
+    at most `cells` cells."""
 
     cells: int = 1
     ends: dict[int, list[float]] = field(default_factory=dict)
@@ -193,8 +195,8 @@ class ChosenSteps:
         return sum(map(len, self.ends.values()))
 
     def of_stage(self, index: int, stage: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
-        """Return the steps of the stage with the number `index`; a run may continue the stage beyond its end, until
-        `until` [s after its start]."""
+        """Return the steps of the `stage` with the number `index`. A run may continue this stage beyond its end, until
+        `until` [s after the start of the stage]."""
         made, limits = self.ends.get(index, []), bounds(stage, grid, self.cells)
         stops = (stage.seconds, *([until] if not reached(stage.seconds, until) else []))
         now = made[-1] if made else 0.0
@@ -205,7 +207,8 @@ class ChosenSteps:
         return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits, part)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
-        """Return the data that a checkpoint stores: for each name of a data set its numbers and their unit."""
+        """Return the data that a checkpoint stores about chosen steps: the numbers of each data set and their unit, by
+        the name of the data set."""
         stages = sorted(self.ends)
         return {
             "stages": ([float(stage) for stage in stages], "1"),
@@ -216,7 +219,8 @@ class ChosenSteps:
 
 
 def describe_steps(job: Sections) -> str:
-    """Return a text on the stages with chosen time steps, and on what determines these steps; '' if there are none."""
+    """Return a text that names the stages with chosen time steps, and what determines these steps; '' if there are
+    none."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
         return ""
@@ -232,10 +236,11 @@ def describe_steps(job: Sections) -> str:
 
 @dataclass(frozen=True)
 class GivenEnds:
-    """Ends of the `count` steps of a stage that lasts `seconds`, as fractions of the stage. Each step is `growth` times
-    as long as the step before it.
+    """Ends of the steps of a stage with `count` given steps, which lasts `seconds` [s]. Each step is `growth` times as
+    long as the step before it.
 
-    The last step ends at 1. Steps beyond the end of the stage are as long as its last step.
+    An index returns the end of a step as a fraction of the stage: the last step ends at 1. Steps beyond the end of the
+    stage are as long as its last step.
     """
 
     count: int
@@ -260,7 +265,8 @@ class GivenEnds:
         return self[index] * self.seconds if index else 0.0
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return the length of step `index` [s], or of all steps after step `since`; equal steps are exactly equal."""
+        """Return the length of step `index` [s], or the length of all steps after step `since` up to the end of step
+        `index`. Equal steps have exactly equal lengths."""
         if since is None and self.growth == 1.0:
             return self.seconds / self.count
         return (self[index] - self[index - 1 if since is None else since]) * self.seconds
@@ -275,11 +281,12 @@ class GivenEnds:
 
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
-    """Return the steps of a stage, none of which exceeds the requested length; a stage without duration has no steps.
+    """Return the steps of a stage, none of which is longer than the job requests. A stage without duration has no
+    steps.
 
-    Without a requested length, as for a body without memory, the surface slides by one cell in a step, a rest is one
-    step, and a ramp has RAMP_STEPS steps. Cycles of an oscillation consist of equal steps, some of which end at the
-    highest and at the lowest load.
+    Stages with `time_step: auto` are divided here if the body has no memory: the surface slides by one cell in a step,
+    a rest is one step, and a ramp has `RAMP_STEPS` steps. A cycle of an oscillation consists of equal steps, some of
+    which end at the highest and at the lowest load.
     """
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)
@@ -306,14 +313,16 @@ SAME_PLACE = 1e-6  # accuracy: deviation from a displacement of whole cells that
 
 
 class Step(NamedTuple):
-    """A time step, with one solve of the contact at its end: at the `time` [s], `dt` [s] after the end of the step
-    before, with the surface at `position` [m].
+    """A time step. The contact is solved once, at the end of the step: at the `time` [s], with the surface at
+    `position` [m]. The step begins `dt` [s] earlier; a step with dt = 0 is a jump of the load.
 
-    A step with dt = 0 is a jump of the load. `control` names the kind of the `load` (Pa, N or m). `growth` is dt over
-    the dt of the step before, and 0 after a jump: results are extrapolated by this factor. `passed` is the number of
-    further steps that this step replaces. `decide` exists for a step that may be too long. Its arguments are the error
-    of the step and, if surfaces attract each other, the motion of the edge of the contact over half the width of the
-    zone in which surfaces separate. It returns a shorter step to make instead, or the record of this step.
+    `control` is the kind of the `load`: pressure [Pa], force [N] or approach [m]. `velocity` is the mean velocity in
+    the step [m/s]. `growth` is dt divided by the dt of the step before, and 0 after a jump: results are extrapolated by
+    this factor. `passed` is the number of further steps that this step replaces.
+
+    A step that may be too long has a function `decide`. The arguments of this function are the error of the step and,
+    if surfaces attract each other, the motion of the edge of the contact divided by half the width of the zone in which
+    surfaces separate. The function returns a shorter step to be made instead, or the record of the accepted step.
     """
 
     number: int
@@ -361,14 +370,14 @@ class Span:
 
     @cached_property
     def rests(self) -> bool:
-        """Return True if the surface rests under a constant load in steps that need not have equal lengths."""
+        """Return True if the surface rests under a constant load, in steps whose lengths may differ."""
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.constant
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Return the lengths of the first and of the last step with a duration [s]; for chosen steps the shortest and
-        the longest length."""
+        """Return the lengths [s] of the first and of the last step with a duration. If steps are chosen, return the
+        shortest and the longest length that is allowed."""
         if isinstance(self.ends, ChosenEnds):
             return self.ends.limits.least, self.ends.limits.most
         return self.ends.interval(1), self.ends.interval(self.count)
@@ -384,8 +393,8 @@ class Span:
         return x + along_x * slid, y + along_y * slid
 
     def place(self, number: int) -> int:
-        """Return the index among the stage's steps with a duration, counted from 1, of the step with this number in the
-        history; 0 for the jump."""
+        """Return the index of a step among those steps of the stage that have a duration, counted from 1; 0 for the
+        jump. `number` is the number of the step in the history."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
@@ -417,12 +426,13 @@ class Span:
 class Timeline:
     """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are stored, not their steps.
 
-    If the history ends before `until` [s], its last stage continues to the first step that reaches `until`, with the
-    time step, velocity and load at its end; a stage without duration cannot continue. `pressure` [Pa] is that of an
-    initial state in sliding, None for a body at rest.
+    If the history ends before `until` [s], its last stage continues to the first step that reaches `until`. The time
+    step, the velocity and the load then stay as at the end of this stage. A stage without duration cannot continue. If
+    the history begins in steady sliding, `pressure` is the pressure of this state [Pa]; for a body at rest it is None.
 
-    `chosen` has the steps that a run has chosen in stages with `time_step: auto`, and grows during the run; further
-    steps are estimated. If it is None, these stages have the steps of a body without memory.
+    `chosen` are the steps that a run has chosen so far in stages with `time_step: auto`; further steps of these stages
+    are estimated. The run adds its steps to `chosen`. If `chosen` is None, these stages have the steps of a body
+    without memory.
     """
 
     def __init__(
@@ -441,8 +451,8 @@ class Timeline:
 
     @classmethod
     def from_job(cls, job: Sections, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
-        """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end. `chosen`
-        has the steps that stages have chosen so far; further steps are estimated."""
+        """Return all steps of a job. If `until` [s] is later than the end of the history, the last stage continues to
+        it. `chosen` are the steps that a run has chosen so far; further steps are estimated."""
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 
@@ -474,7 +484,8 @@ class Timeline:
         return Span(index, stage, number, _jumps(stage, before), count, ends, time, position)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
-        """Return this timeline with the steps that an earlier run chose: the ends of its steps [s] by step number."""
+        """Return this timeline with the steps that an earlier run chose. `times` maps the numbers of these steps to
+        their ends [s]."""
         for index in range(len(self.history)):
             span = self.spans[index]
             if self.chosen is None or not isinstance(span.ends, ChosenEnds):
@@ -524,17 +535,18 @@ class Timeline:
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:
-        """Return the number of the first step that reaches a time [s], or the number of the last step."""
+        """Return the number of the first step whose end reaches a `time` [s]. If no step reaches this time, return the
+        number of the last step."""
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """Return the number of steps in the first stages, as many as are equal in both histories."""
+        """Return the number of steps in those first stages that have equal steps in both timelines."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 
     def first_between_cells(self) -> Step | None:
-        """Return the first step after which the surface is not displaced by a whole number of cells along x and not at
-        all along y; None if there is no such step."""
+        """Return the first step that ends with the surface between cells, or moved along y. Return None if all steps
+        end with the surface moved by a whole number of cells along x only."""
         for span in filter(lambda span: span.moves, self.spans):
             first = span.before + span.jumps + 1
             if isinstance(span.ends, ChosenEnds):
