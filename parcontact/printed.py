@@ -84,9 +84,9 @@ def per_cent(share: float, digits: int = 2) -> str:
     return f"{percent:.{digits}g} %" if percent < 10.0**digits - 0.5 else f"{percent:.0f} %"
 
 
-def stated_error(error: float, digits: int = 2) -> str:
+def stated_error(error: float) -> str:
     """Return an estimated relative error in per cent, or "unknown" above 100 %."""
-    return per_cent(error, digits) if error <= 1.0 else "unknown"
+    return per_cent(error) if error <= 1.0 else "unknown"
 
 
 def with_error(value: float, error: float) -> str:

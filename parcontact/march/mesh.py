@@ -332,5 +332,3 @@ def _extent_of_file(part: Topography, _: int) -> tuple[int, int, tuple[float, fl
 
 load = partial(job.load, fill_grid=fill_grid)
 load_cases = partial(job.load_cases, fill_grid=fill_grid)
-
-__all__ = ["find_shortest_wave", "load", "load_cases", "points_for"]

@@ -347,19 +347,3 @@ def _body_and_energy(
         return rubber, None
     memory = ElasticPressure(slab, setup.prony, integrator) if chosen.energy_memory.on else None
     return rubber, ZenerEnergy(slab, rubber, memory or inverse, unit)
-
-
-__all__ = [
-    "Choices",
-    "Scene",
-    "Setup",
-    "build",
-    "build_on",
-    "choices",
-    "describe_roughness",
-    "describe_scene",
-    "outline",
-    "set_up",
-    "solver_on",
-    "solver_on_tiles",
-]
