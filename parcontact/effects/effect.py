@@ -105,8 +105,8 @@ class EdgeMotion(NamedTuple):
     """Motion of a contact in a step.
 
     `front` is the distance by which the edges of contact moved, divided by half the length of the zone in which
-    surfaces separate. `untouched` is True if nothing touches or is under tension, neither before nor after the step.
-    `begins` is True if surfaces that attract each other come into contact, or lose contact, in the step.
+    surfaces separate. `untouched` is True if no point touches or is under tension before the step, and none after the
+    step. `begins` is True if surfaces that attract each other come into contact, or lose contact, in the step.
     """
 
     front: float = 0.0
@@ -180,7 +180,7 @@ class ContactLaw(Protocol[Memory]):
         """
 
     def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return the motion of the contact in a step, from its measures `before` the step and `now`, after it."""
+        """Return the motion of the contact in a step. `before` and `now` are the measures before and after the step."""
 
     def gap(self, memory: Memory) -> Array | None:
         """Return the map of the gap if the law solves for the gap, else None."""
@@ -305,14 +305,15 @@ class Effect(Protocol[Memory]):
 
     A class may also have these functions of a job, all of them optional:
 
-    * `doubts` yields warnings about the section (`doubts.Doubt`, or sentences), and `facts` yields sentences.
-    * `describe_waves` yields sentences on the waves of a surface on one grid, from bins of wavenumbers [rad/m] and
-      their mean square slopes.
+    * `doubts` yields warnings about the section (`errors.Doubt`, or sentences), and `facts` yields sentences.
+    * `describe_waves` yields sentences on the waves of a surface on one grid. It takes the job, and the wavenumber
+      [rad/m] and the mean square slope of each bin of waves.
     * `changed_material` returns a material that replaces the job's.
     * `response` takes the job and the unit of length [m], and returns the response of a body that is no half space
       (`physics.halfspace.Response`).
-    * `why_no_curve`, `why_no_theory` and `why_not_folded` return a reason, or '': why the job has no friction curve,
-      why Persson's theory cannot predict it, and why each branch of the material needs a map.
+    * `why_no_curve` returns the reason why the job has no friction curve, `why_no_theory` the reason why Persson's
+      theory cannot predict its results, and `why_not_folded` the reason why each branch of the material needs a map.
+      All return '' if there is no reason.
     * `curve_options` yields the options for which friction curves have further columns (`Column.when`).
     """
 
@@ -524,8 +525,8 @@ def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Box:
     """Return the bounds of the pressure for a job whose effects have no contact law. Both the bounds and `most` are in
-    `unit` [Pa]. The upper bound is the hardness of the material; there is none if the material has no hardness, or if
-    it is above `most`."""
+    `unit` [Pa]. The upper bound is the hardness of the material. There is no upper bound if the material has no
+    hardness, or if the hardness is above `most`."""
     hardness = job.material.hardness
     return Box() if hardness is None or hardness / unit >= most else Box(highest=hardness / unit)
 

@@ -5,9 +5,9 @@ With the work of adhesion w [J/m^2], the range rho [m] and the gap g,
     exponential  sigma(g) = (w/rho) exp(-g/rho),          gamma(g) = w exp(-g/rho),
     dugdale      sigma(g) = w/rho for g < rho, else 0,    gamma(g) = w max(1 - g/rho, 0).
 
-A node that crosses the end of Dugdale's law would snap, with an error proportional to the side h of the cells. So
-the computed law ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end of the
-process zone, where the gap rises by about 2 rho h/l in a cell.
+A node that crosses the end of Dugdale's law would snap, with an error proportional to the side h of the cells. So the
+computed law falls to 0 over a ramp in the gap, which is centred at rho. On the ramp, the computed law is the mean of
+the law over a cell at the end of the process zone, where the gap rises by about 2 rho h/l in a cell.
 
 The process zone is the strip at the edge of a contact in which the traction rises. It has the length `l = E* rho^2/w`,
 with E* = 2 G/(1 - nu). Tabor's and Johnson's parameters classify adhesive contacts,

@@ -22,8 +22,8 @@ every iteration, and no barrier is crossed deliberately, so that the history dec
 5. The new gap is `g + theta w`. theta is Newton's step `-<c, w>/(<w, K w> - <w, (-sigma') w>)` if its denominator, the
    curvature of E along w, is clearly positive. Otherwise it is the majorized step `-<c, w>/<w, K w>`, which lowers E as
    gamma is concave; under a load, K then gets a small stiffness of mean values. theta is limited so that no gap becomes
-   negative. If w closes gaps and Newton's step is at least WHOLE, theta is 1. If w would raise E because it was limited
-   to gaps of at least 0, a smaller alpha is tried.
+   negative. If w closes gaps and Newton's step is at least WHOLE, theta is 1. If w would raise E because gaps are at
+   least 0, a smaller alpha is tried.
 6. E must not rise. Otherwise the step is halved.
 
 An iteration applies two operators: A to c, which also gives the certificate, and K to w, which gives the change of the

@@ -11,8 +11,8 @@ The vertex is the load of the pull-off. The error of this load is the sum of fou
 of the solves; PULL_OFF times the median relative mesh error of the contact area up to this row; and ZONE times the
 fourth power of the ratio of a cell's side to the length of the process zone. The last part is due to coarse cells,
 which hold the edge of contact in its place. In tests, spheres were pulled off at seven rates with chosen steps, at
-accuracies from 0.1 to 0.005: all pull-offs differed from runs with 1500 equal steps by less than this error without the
-part of the mesh.
+accuracies from 0.1 to 0.005: all pull-offs differed from runs with 1500 equal steps by less than this error, even
+without its parts by the mesh.
 
 If the pull has no later row, if the contact snaps, or if it still exists at the end, the pull-off is the lowest load
 itself. Then the first part of the error is not e, but the difference between the lowest load and the load of the row

@@ -8,10 +8,9 @@ Heat in Solids (1959), section 10.7)
     T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0.                               (1)
 
 Heat that is released at the depth z reaches the surface with the factor exp(-beta z). A wave of pressure of the
-wavenumber q strains an incompressible half space: the squares of all strains add up to a constant times
-`(q z)^2 exp(-2 q z)`, which is the same under crests and troughs. So the heat that the wave dissipates has the
-distribution `4 q (q z)^2 exp(-2 q z) dz` over the depth, with the mean depth `3/(2 q)`. It reaches the surface with the
-factor
+wavenumber q strains an incompressible half space: the squares of all strains add up to a constant times `(q z)^2 exp(-2
+q z)`, which is the same under crests and troughs. So the heat that the wave dissipates has the distribution `4 q (q
+z)^2 exp(-2 q z) dz` over the depth, with the mean depth `3/(2 q)`. This heat reaches the surface with the factor
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
@@ -133,9 +132,9 @@ class Depths:
         return total
 
     def staying(self, tau: Array) -> Array:
-        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m]. This is the temperature to which a unit of heat still warms the
-        depths where it was released, after diffusion for a time t, given as `tau = D t` [m^2]. The shape is that of
-        `tau`."""
+        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m]. This is the heat capacity times the temperature rise that a
+        unit of heat still causes at the depths where the heat was released, after diffusion for a time t, given as `tau
+        = D t` [m^2]. The shape is that of `tau`."""
         total = np.zeros_like(tau)
         for m, weight in zip(*self._waves(True), strict=True):
             total += weight * np.exp(-(m**2) * tau)
@@ -411,7 +410,8 @@ SLIP_BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is
 
 @dataclass(frozen=True)
 class Flash:
-    """Temperature rises [K] of a contact where heat is released, on the surface and in the body, weighted by this heat.
+    """Temperature rises [K] where a contact releases heat, on the surface and in the body. Means are weighted by this
+    heat.
 
     `mean` is the flash temperature, `lower` and `upper` are the quartiles, and `highest` is the highest rise on the
     surface. In bands, `hottest_band` is the rise of the hottest band; otherwise it is None. With feedback, `rounds`

@@ -20,7 +20,7 @@ A uniform pressure p strains the layer in one direction only, and moves its surf
 incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms (1951);
 for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 
-The solver of contacts needs a preconditioner, which turns a residual r, a displacement, into a pressure z. A
+The solver of contacts needs a preconditioner, which turns a residual r (a displacement) into a pressure z. A
 preconditioner K for waves in the whole box is not enough for waves that are long compared with the thickness of a
 layer. These waves displace a layer by
 
@@ -34,9 +34,9 @@ equation above for the pressure on the contact,
 
     c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
 
-with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle, in which cells
-are joined two by two, approximates the solution. The V-cycle starts with cells of half the thickness, since K treats
-shorter waves. It makes one damped Jacobi step on the way to larger cells and one on the way back, so that the
+with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle, in which each
+step joins two by two cells, approximates the solution. The V-cycle starts with cells of half the thickness, since K
+treats shorter waves. It makes one damped Jacobi step on the way to larger cells and one on the way back, so that the
 preconditioner is symmetric. Maps are in single precision.
 """
 

@@ -139,8 +139,8 @@ class Leakage(Part):
         return PressureDrop(self.substance, *pressures, True, ambient)
 
     def drop_at(self, history: Any, stage: int, time: float) -> PressureDrop:
-        """Return the pressure drop of the fluid at a `time` [s] of the `history`, which is in the stage with the number
-        `stage`."""
+        """Return the pressure drop of the fluid at a `time` [s] of the `history`. `stage` is the number of the stage at
+        this time."""
         lasts, given = history[stage].seconds, history[stage].fluid_pressures
         if given is None:
             return self.drop(self.before(history, stage))

@@ -8,9 +8,9 @@ Reynolds equation,
 where the second equation defines the conductivity K [m^3] of the whole gap. The first equation is solved by finite
 volumes: each point of the map is a cell, and the conductance c of the face between two cells is the harmonic mean of
 their g^3. The pressure is prescribed on two opposite ends of the map. The other two sides are periodic or closed.
-Contact is impermeable, and only cells on a path from end to end are used. The flow follows from its dissipation,
-`sum c (p - p_neighbour)^2` over all faces. The exact pressures make this sum smallest, so that errors of the pressures
-enter the flow squared.
+Contact is impermeable, and only cells on a path from end to end are used. The flow follows from the dissipation, `sum c
+(p - p_neighbour)^2` over all faces. The exact pressures make this sum smallest, so that errors of the pressures enter
+the flow squared.
 
 Each cell with fluid has the balance `sum c (p - p_neighbour) = given` over its faces, where the source `given` is 0
 except at an end with prescribed pressure. If the cells are coloured like a checkerboard, a white cell has only black
@@ -43,7 +43,7 @@ the limit is
     A p1 sqrt(M/(R T)) sqrt(2 kappa/(kappa - 1) (r^(2/kappa) - r^((kappa + 1)/kappa))),
 
 where r is the larger of p2/p1 and (2/(kappa + 1))^(kappa/(kappa - 1)). If p2/p1 is smaller than the second value, the
-flow is choked: a lower p2 does not increase it.
+flow is choked: a lower p2 does not increase the flow.
 """
 
 import math

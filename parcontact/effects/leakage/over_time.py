@@ -70,7 +70,8 @@ class LoadCurve:
 
     def conductivity(self, drop: PressureDrop, load: float) -> float:
         """Return the mean conductivity [m^3] of a seal under a `load` [Pa] of which the fluid carries a part; the flow
-        follows from it by `PressureDrop.flow_rate`. Return NaN if the saved loads do not cover all local loads."""
+        follows from this conductivity by `PressureDrop.flow_rate`. Return NaN if the saved loads do not cover all local
+        loads."""
         least, most = drop.local_loads(load)
         if not self.covers(least, most):
             return np.nan

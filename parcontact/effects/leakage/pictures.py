@@ -24,7 +24,8 @@ THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker":
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return True where a constriction [m] is open but too narrow for continuum flow, in its shape."""
+    """Return True where a constriction [m] is open but too narrow for continuum flow. The shape is that of the
+    argument."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 

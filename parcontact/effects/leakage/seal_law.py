@@ -6,9 +6,9 @@ surface and its approach d, the gap g satisfies
 
     g = A (q + p~) - h - d >= 0,    q >= 0,    q g = 0,    <q> = p0 - <p~>,
 
-where p0 is the load above ambient, and <> the mean over the box. Each round first solves the contact of the heights
-`h - A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through its gap, which gives the next
-p~. Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
+where p0 is the load above ambient, and <> the mean over the box. Each round first solves the contact of the heights `h
+- A p~` under the load `p0 - <p~>` by the usual contact law, and then the flow through the gap of this contact, which
+gives the next p~. Rounds end when the flow and p~ no longer change. The body remembers the whole pressure q + p~.
 
 The fluid flows along x. In contact and in closed pools the flow does not determine the pressure p. There, a small leak
 eps determines the pressure. It is SMALL times the mean of g^3:
@@ -78,8 +78,8 @@ def pressure_of(drop: PressureDrop, share: Map) -> Map:
 
 
 def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
-    """Return the map of gaps [m] through which as much fluid would flow without slip as flows through `gap` [m] with
-    slip. `share` is the map of s, which gives the local pressure."""
+    """Return the map of conducting gaps [m], in place of the gaps `gap` [m]: as much fluid flows through the conducting
+    gaps without slip as through the gaps with slip. `share` is the map of s, which gives the local pressure."""
     if not drop.mean_free_path:
         return gap
     local = np.maximum(pressure_of(drop, share) + drop.outside, 0.0)
@@ -129,8 +129,8 @@ class Rounds:
         self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[Verdict, Map]:
-        """Make a round: find the flow through the map `gap` [m], which belongs to the contact under the fluid's
-        pressure for the map `share` of s.
+        """Make a round: find the flow through a gap. The map `gap` [m] is the gap of the contact under the pressure of
+        the fluid that belongs to the map `share` of s.
 
         Return the verdict on the round, and the map of s for the next round, whose mean pressure is at most `most`
         [Pa].

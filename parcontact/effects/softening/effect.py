@@ -33,7 +33,7 @@ MIXED = 0.7  # tuning: exponent of the new strain in that of the next round
 @dataclass(frozen=True)
 class StrainTable:
     """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]. Between these strains
-    the factors are linear in the logarithm of the strain; outside they are constant."""
+    the factors are linear in the logarithm of the strain; outside this range they are constant."""
 
     start: ClassVar[float] = 0.02  # tuning: strain of the first round of a fixed point
 
@@ -56,8 +56,8 @@ class StrainTable:
         return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
 
     def at(self, strain: float) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function that takes wavenumbers, and returns for each of them the factors f and g at this `strain`
-        [-]."""
+        """Return a function that takes wavenumbers, and returns for each wavenumber the factors f and g at this
+        `strain` [-]."""
         return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:
@@ -79,7 +79,7 @@ class Softened:
     strains: tuple[float, ...]
 
     def octave(self, q: Array) -> NDArray[np.int64]:
-        """Return the number of the octave of each wavenumber q, in 1 over the unit of `longest`."""
+        """Return the number of the octave of each wavenumber q. If `longest` is in m, q is in 1/m."""
         return np.minimum(octave_of(q, self.longest), len(self.strains) - 1)
 
     def same_factors(self, other: Softened) -> bool:
@@ -95,8 +95,8 @@ class Softened:
 
 
 def octave_of(q: Array, longest: float) -> NDArray[np.int64]:
-    """Return the number of the octave of each wavenumber q; octaves are counted from the wavelength `longest`. The unit
-    of q is 1 over that of `longest`."""
+    """Return the number of the octave of each wavenumber q. Octaves are counted from the wavelength `longest`. If
+    `longest` is in m, q is in 1/m."""
     ratio = np.maximum(q * longest / (2.0 * np.pi), 1.0)
     return np.floor(np.log2(ratio * (1.0 + ROUNDING))).astype(np.int64)
 
@@ -127,8 +127,8 @@ EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
 
 def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
-    """Return the factors in the file of a strain sweep, and a sentence on the strain at which they are 1; the sentence
-    is '' if the file has factors.
+    """Return the factors in the file of a strain sweep, and a sentence on the strain at which these factors are 1. The
+    sentence is '' if the file itself has factors.
 
     If the file has moduli, they are divided by their values at the strain `reference` [-], which is by default the
     smallest strain. Raises InputError with the file and what was expected.

@@ -11,17 +11,17 @@ Then
 
     S(z) = <d gamma^2>/<d>/R(z)                                                                                   (2)
 
-is the mean square strain at the depth z, weighted by power. Waves with independent phases would also have
-`<d gamma^2>/(<d> <gamma^2>)` above 1; R is this ratio for waves with the amplitudes of the contact and independent
-phases. In full contact phases are independent, and S is the sum of gamma^2 over all waves. The strain of one wave is a
-mean over the depths at which it dissipates,
+is the mean square strain at the depth z, weighted by power. Waves with independent phases would also have `<d
+gamma^2>/(<d> <gamma^2>)` above 1; R is this ratio for waves with the amplitudes of the contact and independent phases.
+In full contact phases are independent, and S is the sum of gamma^2 over all waves. The strain of one wave is a mean
+over the depths at which this wave dissipates,
 
     gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
 
 which is 3/8 (q A)^2 if there is no other wave. The square of the strain of an octave, or of a band, is the mean of (3)
 over its waves, weighted by their power. S(z) of a surface is the sum of the S(z) of its bands.
 
-Strains depend on the moduli of a steady state, and moduli on the strains. They are found in rounds: a round solves the
+Strains depend on the moduli of a steady state, and moduli on the strains. Both are found in rounds: a round solves the
 state with the moduli at the last strains, and finds new strains. The strains for the next round are the power mean
 `gamma_new^0.7 gamma^0.3`. Rounds end when friction changes by less than a part of the job's accuracy. In bands, the
 waves of all bands strain each band.

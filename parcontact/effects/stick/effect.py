@@ -1,4 +1,5 @@
-"""Stick and slip of the contact area: a body is sheared before it slides, and while parts of its contact slide.
+"""Stick and slip of the contact area: the body is sheared before the surface slides, and while parts of the contact
+slide.
 
 The rigid surface moves by D along itself. Tractions t move the points of the body by u. The tractions are bounded,
 
@@ -6,7 +7,7 @@ The rigid surface moves by D along itself. Tractions t move the points of the bo
 
 A shear strength that depends on the velocity is the same at all points in a step. It is taken at the velocity of the
 rigid surface, and not at the velocities of slip, with which a step could have several solutions. While the surface
-rests, the last strength holds. Before the surface first moves, there are no tractions, and the bound is the highest
+rests, the last strength applies. Before the surface first moves, there are no tractions, and the bound is the highest
 strength.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an

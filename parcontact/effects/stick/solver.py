@@ -20,10 +20,10 @@ function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One it
 3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
    minimizes J along d: both follow from A d, which is known. Then tractions of points that slip get the length f, and
    longer tractions are shortened to f.
-4. Discs are convex, so that all tractions between the old and the new tractions are admissible. t becomes the one with
-   the least J, and A t follows without another application of A. So J never rises. If all points stick, J may be least
-   far beyond the new tractions. Then K is much smaller than the inverse of A, as in a free row of long cells, and STEP
-   grows.
+4. Discs are convex, so that all tractions between the old and the new tractions are admissible. t becomes that traction
+   with the least J, and A t follows without another application of A. So J never rises. If all points stick, J may be
+   least far beyond the new tractions. Then K is much smaller than the inverse of A, as in a free row of long cells, and
+   STEP grows.
 5. If t has moved by only a small part of the change, the next iteration uses `t + kappa w`, shortened to its disc, as
    the new tractions. J always falls towards these tractions.
 
@@ -160,9 +160,9 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
 def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves, r):
     """Put one component of the residual into the map r: the component along x if `along_x`, else along y.
 
-    The residual of a point that sticks is its slip w. That of a point that slips is the part of w across its traction,
-    times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`: points that
-    stick, and slipping points whose traction is sufficiently across the axis. Elsewhere r is 0.
+    The residual of a point that sticks is its slip w. The residual of a point that slips is the part of w across its
+    traction, times the root of `short/(short + turn)`. Points that can move along this axis are marked in `moves`:
+    points that stick, and slipping points whose traction is sufficiently across the axis. Elsewhere r is 0.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
