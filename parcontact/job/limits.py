@@ -35,7 +35,8 @@ def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
 
 
 def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
-    """Yield an error for a box that is free along y only: `what`, such as steady sliding, has no kernel for it."""
+    """Yield an error if the box is periodic along one axis and free along the other. `what` names the part of the job
+    that is not computed in such a box, such as steady sliding."""
     if any(grid.cyclic) and not all(grid.cyclic):
         yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
@@ -84,8 +85,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
 
 
 def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
-    """Yield errors for bands of a surface without a spectrum, and for outputs that bands do not have. Before the shapes
-    with spectra there may be one measured map."""
+    """Yield errors for bands of a surface without a spectrum, and for outputs that do not exist in bands. The first
+    shape may be a measured map if a shape with a spectrum follows."""
     if bands is None:
         return
     for index, shape in enumerate(surface):
@@ -187,7 +188,7 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
 def steady_bodies_do_not_flow(
     grid: Grid, material: AnyMaterial, initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Yield an error for steady sliding of a half space without long-term modulus, by `refuse_flow`.
+    """Yield an error for steady sliding of a half space without long-term modulus.
 
     Such a body flows under waves that do not vary along the sliding direction. It has a steady state only in a periodic
     box of one row of points along this direction.
@@ -199,9 +200,10 @@ def steady_bodies_do_not_flow(
 def refuse_flow(
     material: AnyMaterial, initial: Initial, steady: Steady | None, line: tuple[int, ...] = ()
 ) -> Iterator[Fault]:
-    """Yield an error for steady sliding of a body without long-term modulus, unless it cannot flow.
+    """Yield an error for steady sliding of a body without long-term modulus, since such a body flows.
 
-    It cannot on a `line`, a grid of (nx, ny) points with one row along the sliding direction; () for other grids.
+    It does not flow on a grid with one row of points along the sliding direction. The numbers of points (nx, ny) of
+    such a grid are given as `line`, which is () for all other grids.
     """
     if material.fitted.long_modulus > 0.0:
         return
@@ -320,7 +322,7 @@ def first_step(stage: Stage, grid: Grid) -> float:
 
 
 def estimate_steps(stage: Stage, grid: Grid) -> float:
-    """Return the estimated number of steps of a stage, 0 for an instantaneous one."""
+    """Return the estimated number of steps of a stage; 0 if the stage has no duration."""
     if not stage.seconds:
         return 0.0
     first = first_step(stage, grid)

@@ -104,7 +104,8 @@ def _units() -> dict[str, set[str]]:
 
 
 def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield key, value and unit of all keys in a part; each item of a list of parts is one row."""
+    """Yield the key, the value and the unit of each row of a table that lists all keys of a part. A list of parts has
+    one row for each of its items."""
     for key, value in items(part):
         name = f"{path}{key}"
         if isinstance(value, Part):
@@ -132,7 +133,7 @@ def _unit_of(value: Any, part: Part, key: str) -> str:
 
 
 def listed_line(part: Part) -> str:
-    """Return a part in one line."""
+    """Return the keys and values of a part as one line of text."""
     pairs = [(key, value, _unit_of(value, part, key)) for key, value in items(part)]
     return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
 

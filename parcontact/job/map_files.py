@@ -46,9 +46,9 @@ class Map:
 
 @dataclass(frozen=True)
 class MapContents:
-    """Contents of a file: heights of shape (ny, nx) or (nx,), the length of their unit [m], the size of the map along x
-    and y, or the length of the line, and the length of the unit of this size [m]. Anything that the file does not state
-    is None."""
+    """Contents of a file of heights: the heights `values`, of shape (ny, nx) or (nx,), and the length of their `unit`
+    [m]. `size` is the size of the map along x and y, or the length of a line scan. `unit_xy` is the length of the unit
+    of this size [m]. A value that the file does not state is None."""
 
     values: Array
     unit: float | None = None
@@ -57,8 +57,8 @@ class MapContents:
 
 
 def read_map(part: Topography) -> Map:
-    """Return the map in the file of a shape. The shape must give units and size if the file does not state them, and
-    must not if it does. Raises InputError."""
+    """Return the map in the file of a shape. Raises InputError for an unreadable file, if neither the file nor the
+    shape gives units and size, and if both give them."""
     path = part.path
     try:
         if not path.is_file():

@@ -55,7 +55,8 @@ class DensityLaw(Part):
     expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more (rubber: 6e-4)")
 
     def at(self, reference: float) -> Density:
-        """Return the law that evaluates b_T, with the `reference` temperature of the horizontal shift [deg C]."""
+        """Return the law as an object that evaluates b_T. `reference` is the reference temperature of the horizontal
+        shift [deg C]."""
         return Density(self.expansion, reference)
 
 
@@ -69,7 +70,8 @@ class ModulusFactors(Part):
     rules = (Rule(("temperatures", "logs"), _rising),)
 
     def at(self, reference: float) -> Factors:
-        """Return the law that evaluates b_T, with the `reference` temperature of the horizontal shift [deg C]."""
+        """Return the table as an object that evaluates b_T. `reference` is the reference temperature of the horizontal
+        shift [deg C]."""
         return Factors(self.temperatures, self.logs, reference)
 
 
@@ -132,8 +134,8 @@ Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_inpu
 
 
 def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
-    """Yield an error for a material with a `temperature` [deg C] at which its `shift` is not defined, or without a
-    shift."""
+    """Yield an error if a material has a `temperature` [deg C] and no shift, or if its `shift` is not defined at this
+    temperature."""
     if temperature is None:
         return
     if shift is None:
@@ -245,7 +247,7 @@ class Elastic(Part):
 
     @property
     def fitted(self) -> Elastic:
-        """Return the body itself, which needs no fit as `Dma` does."""
+        """Return the body itself. Only `Dma` has to be fitted."""
         return self
 
     @property
@@ -344,7 +346,7 @@ class Zener(Part):
 
     @property
     def fitted(self) -> Zener:
-        """Return the body itself, which needs no fit as `Dma` does."""
+        """Return the body itself. Only `Dma` has to be fitted."""
         return self
 
     @property
@@ -435,8 +437,8 @@ def describe_temperature(material: Elastic | Zener | Dma, section: str = "materi
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
-    """Return the material at this temperature [deg C], higher or lower than its own. Raises InputError for a material
-    without a shift, and beyond its shift."""
+    """Return the material at a `temperature` [deg C], which may be higher or lower than its own. Raises InputError for
+    a material without a shift, and for a temperature outside the range of the shift."""
     body = material.fitted
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")

@@ -1,7 +1,8 @@
 """Warnings about the physics of a job, before it runs.
 
 The warnings concern jobs outside of the theory, a linear half space with small slopes and strains. Tests use lower
-bounds of slopes, heights, pressures and radii: jobs within the theory get no warning, and some others get none, too.
+bounds of slopes, heights, pressures and radii. So a job within the theory gets no warning, and a job outside of it does
+not always get one.
 """
 
 from __future__ import annotations
@@ -198,11 +199,11 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
-    """Return an upper bound of the pressure divided by the strain [Pa] after a constant pressure for `seconds`, both as
-    in the contact modulus E*.
+    """Return an upper bound of 1/J(t) [Pa]: a constant pressure divided by the strain that it has caused after the time
+    t, given as `seconds`. J is the creep compliance that belongs to the contact modulus E*.
 
-    The bound is the mean of E* over this time t: as int_0^t E*(t - s) J(s) ds = t, and as the creep compliance J rises,
-    J(t) is at least t/int_0^t E*(s) ds.
+    The bound is the mean of E* over this time: as int_0^t E*(t - s) J(s) ds = t, and as J rises, J(t) is at least
+    t/int_0^t E*(s) ds.
     """
     return _contact_modulus(material, seconds, lambda ratio: -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0)
 
@@ -367,8 +368,8 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 
 
 def neighbours(job: Sections) -> Iterator[Doubt]:
-    """Yield a warning if the images of a single sphere in a periodic box change its load, for the contact radii of the
-    history by Hertz's theory."""
+    """Yield a warning if the images of a single sphere in a periodic box change the load of the sphere. The contact
+    radii in the history are taken from Hertz's theory."""
     modulus, grid = instant_contact_modulus(job.material.fitted), job.grid
     yield from acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, grid) for stage in job.history), default=0.0)
@@ -383,11 +384,12 @@ WARN_IMAGES = Kind(
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
-    """Yield a warning if the periodic images of a single sphere change its load by more than the share `ALONE` of it.
+    """Yield a warning if the periodic images of a single sphere change the load of the sphere by more than the fraction
+    `ALONE` of this load.
 
-    `contact` returns the contact radius a [m] from the radius of the sphere [m]; an effect may give another function.
-    An image at the distance r with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact
-    radius changes by `2 a^3/(3 pi) sum 1/r^3`.
+    `contact` returns the contact radius a [m] for a radius of the sphere [m]; an effect may give another function than
+    Hertz's. An image at the distance r with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given
+    contact radius changes by `2 a^3/(3 pi) sum 1/r^3`.
     """
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1

@@ -67,8 +67,8 @@ def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Tr
 
 
 def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Array:
-    """Return a map minus a constant, a plane or a paraboloid, as `detrend` (a key of TERMS) says, that is fitted by
-    least squares to the points in the mask `known`."""
+    """Return a map minus its trend, which is a constant, a plane or a paraboloid. `detrend`, a key of `TERMS`, chooses
+    the kind of trend. The trend is fitted by least squares to the points in the mask `known`."""
     y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in heights.shape), indexing="ij")
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[: TERMS[detrend]]
     trend = np.linalg.lstsq(terms[:, known].T, heights[known], rcond=None)[0]
@@ -134,8 +134,9 @@ def resample(
     """Return a map on a grid of `shape` (ny, nx) by its Fourier series.
 
     Waves that the grid does not resolve, and Nyquist waves of an even grid, are removed. If `most` is given, only waves
-    within an ellipse are kept, whose half axes are these numbers of waves along y and along x. A map that is not
-    `joined` does not go on across its edges: its harmonic part (`make_periodic`) is resampled by splines.
+    within an ellipse of wave numbers are kept: its half axes are the numbers of waves `most` along y and along x. A map
+    that is not `joined` does not continue across its edges: its harmonic part (`make_periodic`) is resampled by
+    splines.
     """
     old = heights.shape
     if old == shape and most is None:
@@ -173,7 +174,7 @@ class Prepared:
 
 
 def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
-    """Return the measured map `found` on the grid of the job, treated as the shape `part` says; to be called on root
+    """Return the measured map `found` on the grid of the job, after the treatment that the shape `part` asks for; root
     only. Raises InputError for a map that is smaller than the box."""
     periodic = part.periodic or ("smooth" if any(grid.cyclic) else "none")
     copies = part.copies

@@ -1,8 +1,9 @@
-"""The job as an object: its sections, in SI units, which do not change. It needs no MPI and reads no maps.
+"""The job as an object: its sections, in SI units, which do not change. This module needs no MPI and reads no maps.
 
 The JSON Schema (draft 2020-12) of job files, for editors, and a table of all keys follow from the types of the
 sections. The schema has the words, ranges, exclusions and defaults of each key. Rules between sections (resolution,
-files, loads) are checked by `parcontact check` only."""
+files, loads) are checked by `parcontact check` only.
+"""
 
 from __future__ import annotations
 
@@ -151,8 +152,8 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """Return sentences on the temperature of the material, and those of effects on what their sections mean for
-        this job."""
+        """Return a sentence on the temperature of the material, and the sentences in which effects say what their
+        sections mean for this job."""
         material: Any = self.material.given
         return tuple(filter(None, (describe_temperature(material), *self._said("facts"))))
 
@@ -344,7 +345,7 @@ class SchemaOfKeys(GenerateJsonSchema):
 
 
 def without_schema() -> dict[str, str]:
-    """Return, for each section of an effect that has no schema, the reason."""
+    """Return the sections of effects that have no schema, with the reason for each."""
     reasons = {}
     for name, effect in listing.find_effects().items():
         try:

@@ -3,9 +3,10 @@
 Sections are frozen pydantic models that report all mistakes at once, as sentences.
 
 A `Part` declares its keys as fields. The description of a field completes the sentence "grid.size must be ..." and
-contains its unit, `[m]`. Pydantic checks each field; the base class checks several keys together: `one_of` and
-`at_most_one` for keys that exclude each other, and `rules`, each of which runs if the fields that it needs are correct,
-even if others are not."""
+contains its unit, `[m]`. Pydantic checks each field, and the base class checks several keys together. `one_of` and
+`at_most_one` name keys that exclude each other. Each of the `rules` is checked if the fields that it needs are correct,
+even if other fields are not.
+"""
 
 from __future__ import annotations
 
@@ -63,8 +64,10 @@ class Origin(NamedTuple):
 
     `from_file` is False for a job from Python. If `numbers_as_texts` is True, texts such as 1e-3 count as numbers,
     since PyYAML's `safe_load` returns them as texts. `names_directory` is True if the job gives its output directory.
-    `mesh` is a sentence on points that the program chose, '' if the job gives them. `approaches` are the places of the
-    approaches of all stages, and `strict` is the place of `numerics.strict`, for messages; '' for jobs from Python.
+    `mesh` is a sentence on points that the program chose, '' if the job gives its points.
+
+    Messages name two further places: `approaches` are the places of the approaches of all stages, and `strict` is the
+    place of `numerics.strict`. For jobs from Python these are () and ''.
     """
 
     path: Path = Path("job.yaml")
@@ -78,9 +81,10 @@ class Origin(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A `check` of the fields named in `needs`, which gets their values and yields faults.
+    """A rule on several fields: the function `check` gets the values of the fields named in `needs`, and yields faults.
 
-    It runs if all these fields are correct. A list with wrong items counts as correct, with None for each such item.
+    A rule is checked if all these fields are correct. A list with wrong items counts as correct, with None for each
+    such item.
     """
 
     needs: tuple[str, ...]
@@ -117,7 +121,8 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return this part as it was in the job, if an effect, such as softening of a material, has replaced it."""
+        """Return this part as it was in the job. An effect may have replaced it, as a counterbody replaces the
+        material."""
         return self
 
     def left_out(self) -> tuple[str, ...]:
@@ -263,8 +268,9 @@ def literal_words(annotation: Any) -> tuple[str, ...]:
 def chosen(
     key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
 ) -> Callable[[Any, ValidationInfo], Any]:
-    """Return a validator that reads a mapping as one of the parts `kinds`, by the word at its `key`. For advice,
-    `called` maps words of other programs to words of `kinds`."""
+    """Return a validator that reads a mapping as one of the parts `kinds`. The value of the mapping at `key` is a word,
+    which chooses the part. `called` maps words of other programs to words of `kinds`; messages then advise the right
+    word."""
 
     def choose(data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, tuple(kinds.values())):
@@ -377,8 +383,8 @@ def log_range(text: str) -> tuple[float, ...]:
 
 
 def bounded(value: float) -> float:
-    """Return a number. Raises ValidationError for a number beyond SMALLEST and LARGEST, as squares of slopes or
-    quotients of lengths would overflow in a run."""
+    """Return a number. Raises ValidationError if its magnitude is not between `SMALLEST` and `LARGEST`, since squares
+    of slopes or quotients of lengths would overflow in a run."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         refuse(Fault(f"must be from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value

@@ -68,7 +68,8 @@ Axis = list[tuple[Setting, ...]]  # of one mapping: for each of its values, the 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep: an axis for each of its mappings, none for a job without a sweep, and the place of the sweep."""
+    """The sweep of a job. `axes` has one axis for each mapping of the sweep, and is empty for a job without a sweep.
+    `place` is the place of the sweep in the job file."""
 
     axes: list[Axis]
     place: Place
@@ -84,8 +85,8 @@ class Sweep:
 
 
 def take_sweep(source: Source) -> Sweep | None:
-    """Remove the sweep from the data of a job, and return it, or None for a sweep with mistakes. The mistakes are added
-    to those of `source`."""
+    """Remove the sweep from the data of a job, and return the sweep. Return None if the sweep has mistakes, which are
+    added to the mistakes of `source`."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)
@@ -171,8 +172,8 @@ Change = str | tuple[str, Any]  # `key.path=value`, or a key and Python data
 def read_job(
     path: Path, changes: Iterable[Change], case: int = 0, given: Source | None = None
 ) -> tuple[Source, tuple[Included, ...], Sweep | None]:
-    """Return the data of a case of a job with its overrides and included materials, the files of these materials, and
-    the sweep of the job, None if it has mistakes.
+    """Return the data of one case of a job with its overrides and included materials, the files of these materials, and
+    the sweep of the job. The sweep is None if it has mistakes.
 
     If a job is `given` as a source, no file is read.
     """
@@ -353,7 +354,7 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
     """Return the job in a job file, or in a mapping with the same keys, whose paths start at the working directory.
 
     `overrides` are texts like `grid.points=512`, or a mapping of such keys to values. `fill_grid` replaces words of the
-    grid, such as `points: auto`, by numbers (see `mesh.load`); without it these words are mistakes. Raises JobError
+    grid, such as `points: auto`, by numbers (see `mesh.load`); if it is None, these words are mistakes. Raises JobError
     with all mistakes.
 
     For a job with a sweep `case` is the number of a case. Raises InputError if the sweep has no case of this number,
@@ -400,8 +401,8 @@ def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
 
 
 def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]) -> list[str]:
-    """Return the warnings about the jobs of cases as sentences, one per subject, with the cases if there are
-    several."""
+    """Return the warnings about the jobs of cases as sentences, one per subject. If there are several cases, a sentence
+    names those to which it belongs."""
     if len(cases) == 1:
         return list(dict.fromkeys(map(str, doubts(cases[0].job))))
     noted = SweepWarnings(at_once=False)

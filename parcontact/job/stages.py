@@ -102,7 +102,7 @@ class Swing(tuple[float, float]):
         return hash((*self, self.frequency))
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] which, times the amplitude of the velocity, gives the displacement after `seconds`."""
+        """Return the displacement after `seconds`, divided by the amplitude of the velocity: a time [s]."""
         turn = 2.0 * math.pi
         return math.sin(turn * math.remainder(seconds * self.frequency, 1.0)) / (turn * self.frequency)
 
@@ -194,7 +194,8 @@ class Ramp:
         return max(self.start, self.end)
 
     def at(self, fraction: float, seconds: float) -> float:
-        """Return the load at a fraction of the stage; exact at both ends, and constant after the stage."""
+        """Return the load at a fraction of the stage. The load is exact at both ends of the stage, and constant after
+        it."""
         fraction = min(fraction, 1.0)
         return (1 - fraction) * self.start + fraction * self.end
 
@@ -378,13 +379,13 @@ class Stage(Part):
         return math.hypot(*self.velocity)
 
     def moving(self, seconds: float) -> float:
-        """Return the time [s] which, times `velocity`, gives the displacement `seconds` after the start of the stage:
-        these seconds, unless the velocity oscillates."""
+        """Return the displacement of the surface `seconds` after the start of the stage, divided by `velocity`: a time
+        [s]. This time equals `seconds` unless the velocity oscillates."""
         return self.velocity.moving(seconds) if isinstance(self.velocity, Swing) else seconds
 
     @property
     def seconds(self) -> float:
-        """Return the duration of the stage [s]; 0 for an instantaneous stage."""
+        """Return the duration of the stage [s]; 0 for a stage that is one step without duration."""
         if self.distance is not None:
             return self.distance / self.speed
         if self.cycles is not None:

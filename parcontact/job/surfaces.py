@@ -29,7 +29,8 @@ class GivenHeights:
     """A read-only map of heights [m], shape (ny, nx), from Python. Only root has `values`: a job that is sent to other
     ranks loses them.
 
-    `cell` is the spacing [m] of the points along x and y, by the coordinates of an xarray; NaN for an array without.
+    `cell` is the spacing [m] of the points along x and y, from the coordinates of an xarray; NaN for an array without
+    coordinates.
     """
 
     def __init__(self, given: Any) -> None:
@@ -266,7 +267,8 @@ def _surface_file(path: Path, info: ValidationInfo) -> Path:
 
 
 class HeightFile(Part):
-    """Heights from a file with the shape of the grid, times `scale`; `dataset` names them in an HDF5 file."""
+    """Heights from a file with the shape of the grid, multiplied by `scale`. In an HDF5 file, `dataset` is the name of
+    the dataset of heights."""
 
     shape: Literal["file"] = "file"
     path: Annotated[Path, AfterValidator(_surface_file), Field(description="the path of a .npy, .h5 or .txt file")]

@@ -3,7 +3,7 @@
 Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
 The size of a text and the number of its values after expansion of aliases are limited.
 
-A mistake is stated as the predicate of a sentence about a key (`Fault`); pydantic collects these.
+A `Fault` states a mistake as the predicate of a sentence about a key. Pydantic collects the faults of a job.
 
 For jobs given as Python data instead of a file, messages about mistakes name the key.
 """
@@ -59,9 +59,9 @@ NOWHERE: Final = Place("")
 
 
 class Located(NamedTuple):
-    """The place of a key of a job: the `path` of keys to it as the user wrote it, and the places of its value and of
-    the key itself. If the key is missing, both are the place of the mapping that lacks it.
-    """
+    """The place of a key of a job: `path` is the list of keys that leads to it, as the user wrote them, `place` is the
+    place of its value, and `key_place` the place of the key itself. If the key is missing, both are the place of the
+    mapping that lacks it."""
 
     path: Key
     place: Place
@@ -71,11 +71,11 @@ class Located(NamedTuple):
 
 @dataclass
 class Source:
-    """The data of a file, of a mapping or of an override, with its place and its mistakes; `content` are the bytes
-    of a file.
+    """The data of a file, of a mapping or of an override. `place` is the place of all data, `mistakes` are the mistakes
+    found so far, and `content` are the bytes of a file.
 
-    `places` has the places of key and value by path; a value without an entry has the place of the list or mapping
-    around it.
+    `places` maps the path of a key to the places of the key and of its value. If a path is missing there, the place of
+    the list or mapping around it is used.
     """
 
     data: Any = None
@@ -147,7 +147,7 @@ def faults_of(error: ValidationError) -> Iterator[Fault]:
 
 
 def shorten(text: str, most: int = 200) -> str:
-    """Return a text without its middle if it has more than `most` characters."""
+    """Return a text of at most `most` characters; dots replace the middle of a longer text."""
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 
 
@@ -179,8 +179,8 @@ def closest(word: Any, words: Iterable[str]) -> str:
 
 
 def in_si(value: Any, unit: str) -> str:
-    """Return the ending '; write 1.0e-3' of a message if a value is a number with a multiple of the `unit` of its key,
-    such as '1 mm', else ''."""
+    """Return the end of a message, such as '; write 1.0e-3', if a value is a number with a multiple of the `unit` of
+    its key, such as '1 mm'. Otherwise return ''."""
     text = value.strip() if isinstance(value, str) and unit in HAVE_PREFIXES else ""
     found = re.fullmatch(rf"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*({'|'.join(PREFIXES)}){unit}", text)
     if not found:
@@ -193,7 +193,7 @@ def in_si(value: Any, unit: str) -> str:
 
 
 def did_you_mean(word: Any, words: Iterable[str]) -> str:
-    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else ''."""
+    """Return the end of a message, '; did you mean X?', if one of `words` is close to `word`, else ''."""
     found = closest(word, words)
     return f"; did you mean {found}?" if found else ""
 
