@@ -1,12 +1,12 @@
 """Checkpoints, which hold the complete state of a run at one instant, and files of heights that were given in Python.
 
 A checkpoint is an HDF5 file with checksums. Maps are global datasets `part/name` of shape (ny, nx), so that any number
-of ranks can read them; numbers are small datasets. Both are in the units of the run, which are powers of two:
-multiplied by the attribute `unit` they are in SI.
+of ranks can read them; numbers are small datasets. Maps and numbers are in the units of the run, which are powers of
+two. A dataset times its attribute `unit` is in SI units.
 
 Each row of a map has its CRC-32 in the group `checksums`. The seal is a text in front of the HDF5 data (the user block
-of the file), which is written last. It has the checksum of all bytes outside of maps. HDF5 may crash on a damaged file,
-so that the seal is checked before HDF5 opens the file. The file has a temporary name until it is complete.
+of the file), which is written last. It has the checksum of all bytes outside of maps. The seal is checked before HDF5
+opens the file, since HDF5 may crash on a damaged file. The file has a temporary name until it is complete.
 
 Heights that were given as an array in Python are stored as a file next to the job or the checkpoint. A run that
 continues from the checkpoint reads this file.
@@ -51,8 +51,9 @@ class TableMark:
 class Contents:
     """Contents of an undamaged checkpoint except its maps.
 
-    `numbers` has the small datasets by name, `units` the units of all datasets [SI]. `maps` has the types of the maps
-    by name, `sums` the checksums of their rows, and `shape` is (ny, nx).
+    Datasets are identified by their names. `numbers` are the small datasets, and `units` the units of all datasets
+    [SI]. `maps` are the types of the maps, which have the shape `shape` (ny, nx), and `sums` the checksums of their
+    rows.
     """
 
     path: Path
@@ -227,7 +228,8 @@ def _contents(path: Path, file: h5py.File) -> Contents:
 
 
 def verify(contents: Contents, slab: Slab) -> str:
-    """Check the maps against their checksums, each rank its own rows; collective. Returns a text on damage, or ''."""
+    """Check the maps against their checksums; collective. Each rank checks its own rows. Return a sentence if a map is
+    damaged, else ''."""
     rows = np.empty(0)
     try:
         for name, dtype in contents.maps.items():

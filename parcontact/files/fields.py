@@ -24,11 +24,9 @@ XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which 
 
 
 class SavedMaps:
-    """The maps in a file, and the coordinates `marks` of their places.
-
-    Places are the instants of a run, whose numbers are `steps`, or the points of a curve. Raises ValueError if datasets
-    have different numbers of places.
-    """
+    """The maps that a file holds at its places. Places are the instants of a run, whose step numbers are `steps`, or
+    the points of a curve. `marks` maps the name of a coordinate, such as time or velocity, to its values at all places.
+    Raises ValueError if datasets have different numbers of places."""
 
     def __init__(self, file: h5py.File) -> None:
         over_time = "t" in file
@@ -57,16 +55,18 @@ class SavedMaps:
         return {index: tuple(float(values[index]) for values in self.marks.values()) for index in self.saved}
 
     def reached(self, step: int) -> list[int]:
-        """Return the steps up to a step that have saved maps."""
+        """Return the numbers of those steps that have saved maps and are not later than `step`."""
         return [self.steps[index] for index in self.saved if self.steps[index] <= step]
 
 
 class GrowingMaps:
-    """A file of maps of shape (place, y, x), laid out for all places before the first one is saved; collective.
+    """A file of maps of shape (place, y, x). Its space is laid out for all places before the first map is saved;
+    collective.
 
-    A place is saved by writing its maps, and then its coordinates, which are NaN before. So a killed run leaves a
-    readable file. Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; `axes` has the units of the
-    coordinates by name, `units` the units of the maps by the names of their datasets.
+    To save a place, its maps are written first, and then its coordinates, which are NaN before. So a killed run leaves
+    a readable file. `path` is the path of the file, `slab` the rows of this rank, and `size` the size of the box (lx,
+    ly) [m]. `axes` maps the names of the coordinates to their units, and `units` the names of the datasets of maps to
+    their units.
     """
 
     def __init__(
@@ -80,9 +80,9 @@ class GrowingMaps:
     ) -> None:
         """Create a new file for `count` places; collective.
 
-        `kind` is KIND or KIND_OF_STEADY_MAPS. `steps` are the numbers of the instants of a run, which may have none
-        yet; None for a curve. Places of the present file `found` are copied: `kept` has the old index of each new one.
-        Maps that were not saved are NaN.
+        `kind` is `KIND` or `KIND_OF_STEADY_MAPS`. For a run, `steps` are the step numbers of all its instants, also of
+        those that are not reached yet; for a curve, `steps` is None. Places of the present file `found` are copied:
+        `kept` maps the new index of such a place to its old index. Maps that were not saved are NaN.
         """
 
         def build(file: h5py.File) -> None:
@@ -118,9 +118,10 @@ class GrowingMaps:
 class SteadyMaps(GrowingMaps):
     """Maps of the points of a friction curve; collective.
 
-    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; (velocity [m/s], mean pressure
-    [Pa], optionally temperature [deg C]) of all points. Points that are saved in the file are kept; a file with other
-    maps is renamed. The attribute `lacking` has the indices of points without maps.
+    `path` is the path of the file, `slab` the rows of this rank, `size` the size of the box (lx, ly) [m], and `names`
+    are the names of the maps. Each of the `points` is a velocity [m/s], a mean pressure [Pa] and optionally a
+    temperature [deg C]. Points that the file already holds are kept; a file with other maps is renamed. The attribute
+    `lacking` has the indices of points without maps.
     """
 
     def __init__(
@@ -165,8 +166,8 @@ class SteadyMaps(GrowingMaps):
 class FieldsFile(GrowingMaps):
     """Saved maps of a run over time; all methods are collective.
 
-    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; `steps` after which maps are
-    saved.
+    `path` is the path of the file, `slab` the rows of this rank, `size` the size of the box (lx, ly) [m], and `names`
+    are the names of the maps. Maps are saved after each of the `steps`.
     """
 
     def __init__(
@@ -185,7 +186,8 @@ class FieldsFile(GrowingMaps):
         self._replace(None)
 
     def make_place(self, steps: Sequence[int]) -> None:
-        """Replace the steps after which maps will be saved by `steps`; saved maps are kept."""
+        """Make place for maps after further `steps`, and for no other maps than these and the saved ones, which are
+        kept."""
         found, _ = _found(self.path, self.slab)
         if found is not None:
             kept = found.reached(max(found.steps, default=0))
@@ -193,9 +195,10 @@ class FieldsFile(GrowingMaps):
             self._replace(found, kept)
 
     def resume(self, step: int, provenance: Provenance) -> str:
-        """Continue after a step: maps saved up to this step are kept, even if other maps were requested then.
+        """Prepare the file of a run that continues after a step. Maps saved up to this step are kept, even if the
+        present job would not save them.
 
-        Returns a message about lost maps, or ''; an unreadable file is renamed. Raises InputError for a locked file.
+        Return a message about lost maps, or ''. An unreadable file is renamed. Raises InputError for a locked file.
         """
         self.provenance = provenance
         found, problem = _found(self.path, self.slab)
@@ -211,7 +214,7 @@ class FieldsFile(GrowingMaps):
         return problem
 
     def is_due(self, step: int) -> bool:
-        """Return True if maps of this step, from which a run continues, are due but not saved."""
+        """Return True if the job asks for the maps of `step`, from which a run continues, and they are not saved."""
         return step in self.steps and step not in self._kept
 
     def renew(self, provenance: Provenance) -> None:
@@ -254,7 +257,7 @@ class FieldsFile(GrowingMaps):
 def cut_back(path: Path, slab: Slab, step: int) -> str:
     """Mark all instants after a step as not reached, in the file of a run that saves no more maps; collective.
 
-    Returns a message about lost maps; raises InputError as `FieldsFile.resume`.
+    Return a message about lost maps, or ''. Raises InputError for a locked file.
     """
     if not slab.agree(path.exists()):
         return ""

@@ -60,8 +60,8 @@ def open_to_append(path: Path) -> FileIO:
 
 
 def refuse_pipes(path: Path) -> None:
-    """Raise InputError if a path, or a file in an output directory or in one of its cases, is a pipe or a device:
-    reading it might never end."""
+    """Raise InputError if a path, or a file in an output directory or in one of its cases, is a pipe or a device, from
+    which a program might read forever."""
     for one in (path, *(found for pattern in PLACES for found in path.glob(pattern))):
         with suppress(OSError):
             if (mode := one.stat().st_mode) and (stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
@@ -86,7 +86,8 @@ def reason(error: BaseException) -> str:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Create the directory of a file that is written within the context; raises InputError if one of them fails."""
+    """Create the directory of a file that is written within the context. Raises InputError if the directory or the file
+    cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield
@@ -95,8 +96,8 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def write_own(path: Path, text: str) -> None:
-    """Write a text to a file, which is replaced if it begins with the same line; another file of this name is renamed,
-    with a warning. Raises InputError."""
+    """Write a text to a file. An existing file is replaced if it begins with the same line as the text; otherwise it is
+    renamed, with a warning. Raises InputError."""
     first = text.partition("\n")[0].encode()
     with writing(path), replaced(path, lambda there: there.read_bytes().startswith(first)) as file:
         file.write(text.encode())

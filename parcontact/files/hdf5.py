@@ -51,7 +51,7 @@ def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
 
 
 def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
-    """Read the rows of every rank into `rows` of each of its `parts`; collective."""
+    """Read the rows of every rank from a file into the arrays `rows` of all `parts`; collective."""
     _move(path, slab, list(parts), False)
 
 
@@ -229,10 +229,8 @@ def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], mar
 
 
 def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
-    """Set coordinates by name for an instant or point, or for all that `index` selects; collective.
-
-    NaN marks places whose maps are not saved.
-    """
+    """Set coordinates of one place, or of all places that `index` selects; collective. Places are instants or points.
+    `marks` maps the names of the coordinates to their values; NaN marks a place whose maps are not saved."""
 
     def act() -> None:
         with h5py.File(path, "r", locking=False) as file:
@@ -296,10 +294,9 @@ CHAIN_BYTES = 50_000  # tuning: largest text of a chain, an attribute of fixed s
 
 @dataclass(frozen=True)
 class Link:
-    """One run in a chain of restarts: its resolved job, and the step from which it continued.
-
-    Several runs in a row with the same job, ranks and program are one link; `runs` is their number.
-    """
+    """One run in a chain of restarts: its resolved `job`, its number of `ranks`, and the step `from_step` from which it
+    continued. If several runs in a row have the same job, ranks and program, one link stands for all of them, and
+    `runs` is their number."""
 
     job: str
     ranks: int
@@ -311,8 +308,9 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Provenance of a file of results: the `chain` of runs that wrote it; of the job the `seeds` of its roughness, a
-    sentence on its `included` file, and `warnings`; the error `budget` so far (plain data); `references` to cite."""
+    """Provenance of a file of results: the `chain` of runs that wrote the file, the error `budget` so far as plain
+    data, and the `references` to cite. From the job come the `seeds` of its roughness, a sentence on its `included`
+    file, and its `warnings`."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
@@ -361,7 +359,8 @@ def read_budget(file: h5py.File) -> dict[str, Any]:
 
 
 def extend_chain(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
-    """Return the chain with one more run; a run identical to the last one only raises its count."""
+    """Return the chain with one more run. If the job, the ranks and the program are those of the last link, the number
+    of runs of this link rises by 1."""
     if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
         return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
     return (*chain, link)

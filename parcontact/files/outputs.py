@@ -37,11 +37,13 @@ SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a j
 class Outputs:
     """Names of the files that one verb writes; '' or () if it writes no such files.
 
-    Messages call the results by `words`. If `table` exists, there are results. Further files are `tables`, `maps`
-    (HDF5), a `log` and `others`. `copies` are the job as given, and the job with every default. A verb with a directory
-    of `checkpoints` continues from the newest one, other verbs from their table; the sections and keys `same` of both
-    jobs must agree. `complete` is a sentence on a finished table; its {} stands for the last step or the number of
-    points.
+    `words` is the name of the results in messages. A directory has results of the verb if it has the file `table`.
+    Further files are `tables`, `maps` (HDF5), a `log` and `others`. `copies` are the job as given, and the job with
+    every default.
+
+    A verb with a directory of `checkpoints` continues from the newest checkpoint, and other verbs continue their table.
+    The sections and keys `same` must then be the same in both jobs. `complete` is a sentence on a finished table; its
+    {} stands for the last step or the number of points.
     """
 
     words: str
@@ -61,7 +63,8 @@ class Outputs:
         return tuple(filter(None, (self.table, *self.tables, self.maps, self.log, *self.others)))
 
     def changes(self, then: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-        """Return why a job (plain data) cannot continue another: their differences; '' if it can."""
+        """Return the differences for which results of the job `then` cannot be continued with the job `now`, as a text;
+        '' if there are none. Both jobs are plain data."""
         return differences(then, now, self.same)
 
     @property
@@ -159,7 +162,7 @@ def read_claims(directory: Path) -> dict[str, Claim]:
 
 
 def sound_claims(directory: Path) -> dict[str, Claim]:
-    """Return what `read_claims` returns; raises InputError for an unreadable marker."""
+    """Return the records of commands in a directory, by verb. Raises InputError for an unreadable marker."""
     try:
         return read_claims(directory)
     except (OSError, ValueError) as error:
@@ -191,7 +194,8 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
 
 
 def keep_mesh(job: Mapping[str, Any], different: str) -> str:
-    """Return advice to keep the mesh of a job (plain data) if the text `different` names it, else ''."""
+    """Return advice on how to keep the mesh of a job (plain data), if `different`, a text on differences of two jobs,
+    names the mesh; else ''."""
     if "grid.points" not in different:
         return ""
     points = str(job["grid"]["points"]).replace(" ", "")
@@ -422,7 +426,7 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a directory without a marker is that of a sweep, or if it has foreign files.
+    """Raise InputError if a directory without a marker is the directory of a sweep, or if it has foreign files.
 
     `names` are the names of its files. Hidden files and the files of `PERMITTED` are allowed.
     """
@@ -443,8 +447,8 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
 
 
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
-    """Raise InputError if a record in the directory is of a job whose sections `SCENE` differ from those of the job
-    `data` (plain data)."""
+    """Raise InputError if a directory has a record of another job. Two jobs are different if any section in `SCENE`
+    differs. `data` is the present job as plain data."""
     for verb, claim in claims.items():
         if found := differences(claim.job, data, SCENE):
             raise InputError(

@@ -76,8 +76,8 @@ class StepRow:
 
     @property
     def error_gap(self) -> float:
-        """Return the estimated relative error of the mean gap, which is that of the share of open area; NaN in full
-        contact or if unknown."""
+        """Return the estimated relative error of the mean gap. It equals the relative error of the share of the surface
+        that is open. Return NaN in full contact or if it is unknown."""
         area = self.measures.contact_area_corrected
         return self.error_area * area / (1.0 - area) if area < 1.0 else math.nan
 
@@ -112,8 +112,8 @@ class MeasuresFile(GrowingTable):
         self.table, self._branches = table, branches
 
     def write(self, row: StepRow) -> None:
-        """Append a row. After an error the file is unchanged, but `table` includes the row: the checkpoint holds it,
-        and the next run adds it to the file."""
+        """Append a row. If writing fails, the file is unchanged, but `table` includes the row. So the next checkpoint
+        holds the row, and the run that continues from it adds the row to the file."""
         line = cells(row_numbers(row, self._branches))
         self.table = TableMark(self.table.rows + 1, ",".join(line))
         self.append(line)
@@ -267,10 +267,11 @@ class Console:
 
 @dataclass(frozen=True)
 class Recording:
-    """Settings of the files that a run of `total` steps (an estimate if `open_ended`) writes.
+    """Settings of the files that a run writes. The run has `total` steps; this number is an estimate if the run is
+    `open_ended`.
 
-    measures.csv has the dissipation of `branches` and the columns `added` by effects; `maps` of a box of this `size`
-    [m] are saved after `every` steps.
+    measures.csv has the dissipation of `branches` and the columns `added` by effects. After `every` steps the `maps` of
+    a box of this `size` [m] are saved.
     """
 
     total: int

@@ -198,10 +198,10 @@ class _Run:
 
 
 def sum_up_errors(rows: Sequence[StepRow], asked: tuple[float, float]) -> Iterable[str]:
-    """Yield a sentence on the errors of friction, and one on the errors of area, in the rows of sliding.
+    """Yield a sentence on the errors of friction, and a sentence on the errors of area, in the rows of sliding.
 
-    It has the mean error, which should not exceed the accuracy `asked` of friction or of area, and the largest error
-    with its sources.
+    Each sentence states the mean error, which should not exceed the accuracy `asked` of friction or of area, and the
+    largest error with its sources.
     """
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]

@@ -261,10 +261,11 @@ class Run:
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:
-    """Return the parts of the error budget that a smaller `numerics.accuracy` reduces, because it chose their settings.
+    """Return the parts of the error budget that a smaller `numerics.accuracy` reduces, because the accuracy chose their
+    settings.
 
-    The part "time" is one of them if all stages of the slide choose their steps; without a slide, all stages with a
-    duration.
+    The part "time" is among them if all stages that slide choose their steps. In a job that does not slide, all stages
+    with a duration must choose their steps.
     """
     numerics = job.numerics
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
@@ -280,7 +281,8 @@ def chosen_by_accuracy(job: Job) -> set[str]:
 
 @dataclass(frozen=True)
 class Ended:
-    """End of a run: its exit code, and its march, or the checkpoint of an earlier run that had nothing left to do."""
+    """End of a run: its exit code `code`, and its last state. This state is the `march`. If an earlier run had finished
+    the job, nothing was left to march, and the state is in `contents`, the checkpoint of the earlier run."""
 
     code: int
     march: March | None

@@ -24,8 +24,8 @@ from .outputs import Directory
 class StopFile:
     """A stop file shared by all programs of a sweep, which none of them removes.
 
-    It stops programs that run when it is created or touched: a file that was last changed at the time `before` [ns] has
-    no effect. The ranks of one program stop each other by a second file, `own`.
+    The file stops programs that are running when it is created or touched: a file that was last changed at the time
+    `before` [ns] has no effect. The ranks of one program stop each other by a second file, `own`.
     """
 
     path: Path
@@ -42,8 +42,8 @@ class StopFile:
         return self.own.exists() or _touched(self.path) not in (0, self.before)
 
     def ask_own(self) -> None:
-        """Stop the other ranks of this program by the file `own`. If it cannot be written, they go on with
-        their cases."""
+        """Stop the other ranks of this program by the file `own`. If this file cannot be written, the other ranks go on
+        with their cases."""
         with suppress(OSError):
             self.own.touch()
 
@@ -103,8 +103,8 @@ REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was fou
 
 @dataclass(frozen=True)
 class Verdict:
-    """Decision of all ranks after a step: `stop` says why the run stops early, `problem` why it fails ('' if it does
-    not); `save` is True if a checkpoint is due."""
+    """Decision of all ranks after a step. `stop` is the reason why the run stops early, and `problem` the reason why it
+    fails; both are '' if it goes on. `save` is True if a checkpoint is due."""
 
     stop: str = ""
     save: bool = False
@@ -113,8 +113,9 @@ class Verdict:
 
 @dataclass
 class Watch:
-    """Decides after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any; the
-    run does not remove `sweep_stop_file`, which stops all cases of a sweep."""
+    """Decides after every step whether the run goes on. `limit` is the time (of `time.monotonic`) at which the run must
+    have ended, None without a limit. The file `sweep_stop_file` stops all cases of a sweep, and the run does not remove
+    it."""
 
     slab: Slab
     rules: Checkpoint
@@ -172,7 +173,8 @@ class Watch:
 
     @property
     def reserve(self) -> float:
-        """Return the wall time [s] for one more step and a checkpoint, each twice as long as seen so far."""
+        """Return the wall time [s] that one more step and a checkpoint may need. Each of them is expected to take twice
+        as long as before."""
         write = self._write if self._write >= 0.0 else self.state_bytes / FIRST_WRITE
         return RESERVE_SECONDS + 2.0 * (max(self._steps, default=0.0) + write)
 
@@ -188,9 +190,9 @@ def watching(directory: Directory, rules: Checkpoint, options: Options) -> Itera
 def limit_time(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
     """Return the time (of `time.monotonic`) by which a run must end: after `wall` seconds, or with its batch job.
 
-    The end of a batch job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME [s since 1970], or PBS_WALLTIME after the start
-    of this program, slightly too late. An end before the start of this program belongs to another job and is ignored.
-    The system's clock is read once, as it may be changed later.
+    The end of a batch job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME [s since 1970]. With PBS, it is PBS_WALLTIME
+    after the start of this program, slightly later than the true end. An end before the start of this program belongs
+    to another job and is ignored. The system's clock is read once, as it may be changed later.
     """
     now = time.monotonic()
     born, epoch = now - age(), now - time.time()

@@ -223,7 +223,7 @@ def unfinished_first(chosen: Sequence[Case]) -> list[int]:
 
 
 def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
-    """Return the jobs of the cases that still have to run, which are all of them if the sweep starts `afresh`; root
+    """Return the jobs of the cases that still have to run. If the sweep starts `afresh`, these are all cases. Root
     only."""
     return [case.job for case in chosen if afresh or state_of(case) != "done"]
 
@@ -269,7 +269,7 @@ def _directory(cases: Sequence[Case]) -> Path:
 
 
 def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
-    """Write all tables of a sweep from the results of its cases; root only. Several programs may do so at the same
+    """Write all tables of a sweep from the results of its cases; root only. Several programs may write them at the same
     time."""
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
@@ -296,7 +296,7 @@ def _asks_for(case: Case, section: str) -> bool:
 
 
 def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
-    """Yield a mapping for each column of errors. It has the largest error of each finished case by the number of the
+    """Yield a mapping for each column of errors: from the number of each finished case to the largest error of this
     case."""
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     for name in slide.ERRORS:

@@ -48,8 +48,8 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Store the wisdom of this run for later runs, unless the stored wisdom is as large and so has as many transforms;
-    collective."""
+    """Store the wisdom of this run for later runs; collective. A stored wisdom that is at least as large has at least
+    as many transforms, and is kept."""
     data = gather(slab).tobytes()
     with suppress(OSError):  # a run without stored wisdom works too
         place = _place(transforms, slab) if slab.root else None
