@@ -117,9 +117,7 @@ def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
     return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) and isotropic else None
 
 
-def predict_steady(
-    job: Job, wanted: Request, gamma: float = persson.GAMMA, shortest: float = 0.0
-) -> Iterator[SteadyInstant]:
+def predict_steady(job: Job, wanted: Request, shortest: float = 0.0) -> Iterator[SteadyInstant]:
     """Yield the predicted states of a friction curve for the job's spectrum on an unbounded surface. In bands, waves
     below `shortest` [m] are left out. Raises InputError for jobs outside the theory."""
     rings = _on_body(job, _continuum(job, 0.0, shortest))
@@ -129,7 +127,7 @@ def predict_steady(
         body, (vx, vy) = _material(at), wanted.velocity(speed)
         omega = wavy.frequency(kx, ky, vx, vy)
         modulus = complex_modulus(omega, body.modulus_inf, body.moduli, body.relaxation_times)
-        friction = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
+        friction = persson.friction_coefficient(pressure, rings, vx, vy, modulus)
         area = persson.contact_area(pressure, rings, modulus)
         yield SteadyInstant(speed, pressure, temperature, time_factor_of(at.material), float(friction), float(area))
 

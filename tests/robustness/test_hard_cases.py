@@ -12,14 +12,9 @@ from closed_forms import step_responses
 from mpi4py import MPI
 
 from parcontact.door.doctor import (
-    CELL,
     CHECKS,
-    CREEP,
-    FAST,
     GLASSY,
     HEIGHT,
-    INTEGRATORS,
-    LONG_TERM,
     MEAN,
     PRONY,
     RADIUS,
@@ -43,6 +38,11 @@ from .strict_bench import StrictBench
 
 # -- hard cases of time: steps far from relaxation times, moduli far apart, odd and many branches, vanishing ----------
 
+LONG_TERM = PRONY[0]  # modulus at long times [Pa]
+CREEP = RELAXATION * GLASSY / LONG_TERM  # creep time of the branch and the spring [s]
+FAST = 1.0 / (K * RELAXATION)  # velocity at which the wave excites one radian per relaxation time [m/s]
+CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under uniform pressure, over p side/G
+INTEGRATORS: tuple[prony.Integrator, ...] = ("exponential", "exponential-linear", "backward-euler")
 STIFF = 2 * K * HEIGHT  # pressure amplitude of the wave in full contact over the modulus
 FORCE = 0.15  # N
 RUBBER = zener(GLASSY, [], [])
