@@ -26,8 +26,8 @@ sliding, where friction is a sum of squares without cancellation, the error is t
 the cells, plus STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid. Their errors do not
 average out, so that N = 1, and are IDENTICAL times as large for the area and for steady friction. Errors also grow if
 edges of contact follow an axis of the grid: by the factor IDENTICAL if all edges do, and less, in proportion, if some
-edges do. On a grid with less than FEW_CELLS cells per shortest wave, a map lacks waves. This adds the error WAVES
-(4/cells)^2.5 to friction, with the number of cells per shortest wave.
+edges do. On a grid with less than FEW_CELLS cells per shortest wave, a map lacks waves. The error of friction is then
+larger by WAVES (4/n)^2.5, where n is the number of cells per shortest wave.
 
 Loss at edges: the pressure rises from an edge of contact as the root of the distance. The mean square of its waves of
 wavenumber q across the edge therefore falls as q^-3. In steady sliding at the speed v these waves lose power in
@@ -143,7 +143,7 @@ def _solver_of_area(observed: StepObservation) -> float:
 
 def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors that the length of a step causes, including a rise of friction within the step. If the body
-    computes the error of its own step, this is the error of friction and of the area."""
+    computes the error of its own step, both results are this error."""
     error = time_error(run, observed)
     if observed.own_error is not None:
         return ErrorPair(error, error)
@@ -189,8 +189,8 @@ def _grow_if_coherent(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
-    """Return an upper bound on the share of friction that the grid misses. At edges of contact there are waves shorter
-    than the cells of the grid, whose loss is missing. Return 0 at rest and for an elastic body."""
+    """Return an upper bound on the share of friction that the grid misses: the grid lacks waves shorter than its cells,
+    so that the loss of these waves at edges of contact is missing. Return 0 at rest and for an elastic body."""
     if run.prony is None or not any(observed.way):
         return 0.0
     cell = cell_along(run, observed.way)
@@ -282,8 +282,8 @@ NAMES = ErrorParts._fields
 @dataclass(frozen=True)
 class ErrorBudget:
     """Errors at one instant. `friction` states the relative errors of friction by source, whose sum may exceed 1; it is
-    None without friction. `area` states the relative errors of the contact area. If `resolved` is False, spots of
-    contact may be smaller than a few cells, and no errors are stated."""
+    None without friction. `area` states the relative errors of the contact area by source. If `resolved` is False,
+    spots of contact may be smaller than a cell, and no errors are stated."""
 
     friction: ErrorParts | None
     area: ErrorParts
@@ -295,8 +295,8 @@ class ErrorBudget:
         return replace(self, friction=friction)
 
     def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
-        """Return the budget with further relative errors of friction and area, which are added to the errors of the
-        solver. They are the changes in the last round of a fixed point."""
+        """Return the budget of the last round of a fixed point. `friction` and `area` are the relative changes of
+        friction and area in this round. They are added to the errors of the solver."""
         own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
         return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
 

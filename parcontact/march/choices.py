@@ -89,7 +89,8 @@ class Choices:
         return self.job.material.hardness
 
     def forbidden(self, what: str) -> str:
-        """Return why an effect of the job forbids `what` (`effects.effect.Effect.forbids`); '' if no effect does."""
+        """Return the reason why an effect of the job forbids a method of calculation, such as single precision; '' if
+        no effect does. `what` is a key of `effects.effect.Effect.forbids`."""
         return next((effect.forbids[what] for effect in self.effects.values() if what in effect.forbids), "")
 
     @cached_property

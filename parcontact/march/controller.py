@@ -313,10 +313,12 @@ class Controller:
         True if a longer step was tried before.
 
         Under attraction the edge of contact has moved by `front` half process zones in the step. It may move by one
-        half process zone; if the body relaxes and the job asks for energies, by the square root of the accuracy times a
-        half process zone. `begins` is True if a contact begins or ends in the step. No step is shortened for these two
-        reasons below SNAP_SHARE times the longest step of the stage, or below RELAXING times the shortest relaxation
-        time: in a step so short the body cannot relax.
+        half process zone. If the body relaxes and the job asks for energies, the edge may move only by the square root
+        of the accuracy times a half process zone. `begins` is True if a contact begins or ends in the step.
+
+        Because of `front` or `begins`, no step becomes shorter than SNAP_SHARE times the longest step of the stage, or
+        than RELAXING times the shortest relaxation time. In a step so short a jump of the contact is over before the
+        body relaxes.
         """
         order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
         ratio = error / (OF_STEPS * self.asked.of_steps)

@@ -87,10 +87,11 @@ def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
 def of_solve(
     scene: Scene, step: Step, failed: Contact, last: Contact, tried: list[str], h: Array, moved: float
 ) -> StepError:
-    """Return the error for a step whose contact solve has `failed`; collective.
+    """Return the error for a step whose contact solve was given up; collective.
 
-    `tried` names the further attempts, and `last` is the contact of the last attempt. `h` is the map of heights in the
-    run's units, shape (rows of this rank, nx). The surface moves by `moved` cells in the step.
+    `failed` is the contact of this solve. `tried` names the further attempts, and `last` is the contact of the last
+    one. `h` is the map of heights in the run's units, shape (rows of this rank, nx). The surface moves by `moved` cells
+    in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
@@ -255,7 +256,7 @@ class DryLaw:
         """Return None: this law has no memory."""
 
     def entries(self, memory: None, units: Units) -> dict[str, Entry]:
-        """Return no entries."""
+        """Return no entries for checkpoints: this law has no memory."""
         return {}
 
     def restored(self, memory: None, saved: Saved) -> None:

@@ -237,7 +237,7 @@ FIELDS_OF_EFFECTS = {part: need for name, need in FIELDS_NEED.items() for part i
 
 
 class March:
-    """A calculation in time: a scene and its state at an instant, which advances step by step."""
+    """A calculation in time: a scene and its state at an instant. A march advances step by step."""
 
     def __init__(self, scene: Scene, state: State | None = None) -> None:
         self.scene = scene

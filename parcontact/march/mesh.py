@@ -142,7 +142,7 @@ Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
 class Scenery(Part):
-    """The sections of a job on which its mesh depends."""
+    """The sections of a job that determine its mesh."""
 
     surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
     initial: Initial = Initial()

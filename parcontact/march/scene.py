@@ -262,8 +262,8 @@ def build_on(setup: Setup) -> Scene:
 def solver_on(
     setup: Setup, slab: Slab, tolerance: float, operator_type: type[np.floating] | None = None
 ) -> tuple[ContactSolver, Operators]:
-    """Return a solver and the operators of a setup's body on another grid, for a start or a retry; collective. Their
-    transforms are planned without measurement, so that a restarted run has the same rounding."""
+    """Return a solver and the operators of a setup's body on another grid, for a start or a retry; collective. The
+    transforms on this grid are planned without measurement, so that a restarted run has the same rounding."""
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 
