@@ -21,12 +21,12 @@ along each side.
 The functions and loops have these arguments:
 
 * pairs: the first |pairs| levels join two cells only, along x if `pairs` > 0 and along y if `pairs` < 0;
-* wide, tall: points of a cell along x and y, each 2, or None for 1: the loops are compiled without branches they do not
-  need;
+* wide, tall: points of a cell along x and y, each 2 or None. None stands for 1: loops are then compiled without
+  branches that they do not need;
 * above: 1 if this rank's first cell has a row of points on the rank before, else 0;
 * neighbours: rows next to the rows of this rank (`row_of`);
-* known: weight `w/(w + f)` of each cell, and of each point 1 in c and 0 outside c; interpolation adds `1 - known` times
-  the interpolated value.
+* known: weight of each cell, `w/(w + f)`, or of each point, 1 in c and 0 outside c. Interpolation adds `1 - known`
+  times the interpolated value.
 """
 
 import math

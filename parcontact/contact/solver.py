@@ -5,8 +5,8 @@ is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is g
 
     p >= 0,   g >= 0,   p g = 0.
 
-The solution minimizes `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. With `R` = restrict to the working set
-and `C` = subtract the mean over it, one iteration is:
+The solution minimizes `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. R restricts a map to the working set, and
+C subtracts the mean over the working set. One iteration is:
 
 1. The working set consists of the contact (p > 0) and of the points that penetrate (g < 0).
 2. The residual is `r = C R g`, and the preconditioned residual is `z = C R E' K E r`. K is close to the inverse of A,
@@ -14,8 +14,8 @@ and `C` = subtract the mean over it, one iteration is:
 3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction, and corrects for a last
    step that was not exact. beta is 0, so that t = z, if f falls much less along `z + beta t` than along z, or if the
    bounds cut off much of the last step.
-4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the hardness is far below the
-   stiffness, alpha is limited, so that few pressures change from one bound to the other.
+4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the hardness is far below the stiffness,
+   alpha is limited, so that few pressures change from one bound to the other.
 5. f must not rise. Otherwise the step is halved, and the direction is forgotten.
 
 The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
