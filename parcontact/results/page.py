@@ -198,7 +198,7 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
     rows = []
     for band in range(cut.count):
-        ends = " to ".join(printed.quantity(end, "m") for end in cut.wavelengths(band))
+        ends = report_sections.write_span(cut.wavelengths(band), "m")
         rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
@@ -258,7 +258,7 @@ def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
         if found.shift.vertical is not None:
             yield "vertical shift factor b_T", f"{found.modulus_factor:.4g}"
     if found.band is not None:
-        yield "measured frequencies, reduced to the reference", _write_band(found.band)
+        yield "measured frequencies, reduced to the reference", report_sections.write_span(found.band, "Hz")
     if found.temperatures is not None:
         yield "measured temperatures", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
 
@@ -267,14 +267,10 @@ def _list_bands(job: Job) -> ReportTable:
     """Return a table of the frequencies that sliding excites at each temperature."""
     found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
     degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
-    ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
-    rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
+    ranges = ([report_sections.write_span(band, "Hz") for band in (one.band, one.reduced)] for one in found)
+    rows = [(degree, f"{one.factor:.3g}", *ends) for degree, one, ends in zip(degrees, found, ranges, strict=True)]
     caption = "frequencies of the passing waves of the surface, at all velocities of the job"
     return ReportTable(("temperature", "a_T", "excited by the job", "reduced to the reference"), rows, caption)
-
-
-def _write_band(band: tuple[float, float]) -> str:
-    return f"{printed.quantity(band[0], 'Hz')} to {printed.quantity(band[1], 'Hz')}"
 
 
 def _over_frequency(job: Job) -> list[Panel]:

@@ -188,10 +188,10 @@ def scales_table(curve: Results) -> list[ReportTable]:
         for one in excited_bands(whole, (job.steady.temperatures if job.steady else None) or ()):
             body = whole if one.temperature is None else whole.at_temperature(one.temperature)
             at = "" if one.temperature is None else f" at {one.temperature:g} °C"
-            rows.append((f"frequencies that the job excites{at}", _span(one.band, "Hz")))
-            rows.append((f"shear moduli |G| at these frequencies{at}", _span(_moduli(body, one.band), "Pa")))
+            rows.append((f"frequencies that the job excites{at}", write_span(one.band, "Hz")))
+            rows.append((f"shear moduli |G| at these frequencies{at}", write_span(_moduli(body, one.band), "Pa")))
         if (measured := getattr(job.material.fitted, "band", None)) is not None:
-            rows.append(("measured frequencies, at the reference temperature", _span(measured, "Hz")))
+            rows.append(("measured frequencies, at the reference temperature", write_span(measured, "Hz")))
         return [ReportTable(("what matters", "range"), rows, "lengths, frequencies and moduli")]
     return []
 
@@ -199,9 +199,9 @@ def scales_table(curve: Results) -> list[ReportTable]:
 def _lengths(job: Job) -> list[tuple[str, str]]:
     if job.bands is not None:
         ends = cut_bands(job).spectrum.ends
-        return [("waves of the surface", _span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
+        return [("waves of the surface", write_span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
     waves = ([getattr(part, f"{end}_wavelength", None) for end in ("long", "short")] for part in job.surface)
-    rows = [("waves of the surface", _span([end for end in each if end], "m")) for each in waves if all(each)]
+    rows = [("waves of the surface", write_span([end for end in each if end], "m")) for each in waves if all(each)]
     return [*rows, ("cell of the grid", quantity(max(job.grid.dx, job.grid.dy), "m"))]
 
 
@@ -213,7 +213,8 @@ def _moduli(job: Job, band: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
-def _span(ends: Sequence[float], unit: str) -> str:
+def write_span(ends: Sequence[float], unit: str) -> str:
+    """Return the ends of a range as text, with their unit: 3 mm to 25 µm."""
     return " to ".join(quantity(end, unit) for end in ends)
 
 
@@ -300,7 +301,7 @@ def _list_main_bands(curve: Results) -> list[ReportTable]:
     for place, rows in points.items():
         friction = [columns["friction"][row] for row in rows]
         most = rows[friction.index(max(friction))]
-        waves = " to ".join(printed.quantity(columns[f"{end}_wavelength"][most], "m") for end in ("long", "short"))
+        waves = write_span([columns[f"{end}_wavelength"][most] for end in ("long", "short")], "m")
         share = f"{100 * max(friction) / sum(friction):.0f} %" if sum(friction) > 0.0 else "–"
         found.append((*place, waves, share))
     table = _shorten([*map(_add_unit, names), "waves", "share of friction"], found)
