@@ -40,7 +40,7 @@ import runs
 from coverage_scenes import FINER, Json, Sketch, sketch
 from matplotlib.figure import Figure
 
-from parcontact.effects.adhesion import results, section
+from parcontact.effects.adhesion import effect, results
 from parcontact.errors import InputError, RunError
 from parcontact.job import Job
 from parcontact.job.history import Timeline
@@ -128,7 +128,7 @@ def _march(job: Job) -> Json:
     found = {"rows": rows, "run": properties, "box": box, "tolerance": job.numerics.tolerance}
     if job.section("adhesion") is None:
         return found
-    law = section.law_of(job)
+    law = effect.law_of(job)
     return {**found, "coarseness": law.cell / law.zone}
 
 
