@@ -92,7 +92,7 @@ class Facts:
 
 
 def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) -> None:
-    """Write a checkpoint; collective. After an error an existing file of this name is unchanged."""
+    """Write a checkpoint. Collective. After an error an existing file of this name is unchanged."""
     maps = _maps(entries)
     part = slab.agree(files.unused(path))
 
@@ -141,7 +141,7 @@ def row_sums(rows: Array) -> NDArray[np.uint32]:
 
 
 def inspect(path: Path) -> Contents:
-    """Return the contents of a checkpoint except its maps, which are checked by `verify`; raises InputError for a
+    """Return the contents of a checkpoint except its maps, which are checked by `verify`. Raises InputError for a
     damaged file."""
     try:
         if problem := _broken(path):
@@ -153,7 +153,7 @@ def inspect(path: Path) -> Contents:
 
 
 def is_one(path: Path) -> bool:
-    """Return True if a file begins like a checkpoint; raises OSError."""
+    """Return True if a file begins like a checkpoint. Raises OSError."""
     with path.open("rb") as file:
         return file.read(len(TITLE)) == TITLE.encode()
 
@@ -228,7 +228,7 @@ def _contents(path: Path, file: h5py.File) -> Contents:
 
 
 def verify(contents: Contents, slab: Slab) -> str:
-    """Check the maps against their checksums; collective. Each rank checks its own rows. Return a sentence if a map is
+    """Check the maps against their checksums. Collective. Each rank checks its own rows. Return a sentence if a map is
     damaged, else ''."""
     rows = np.empty(0)
     try:
@@ -245,7 +245,8 @@ def verify(contents: Contents, slab: Slab) -> str:
 
 
 def read_maps(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
-    """Read the maps of a checkpoint into the maps of `entries`, in the units of the entries; collective."""
+    """Read the maps of a checkpoint into the maps of `entries`, and convert them to the units of the entries.
+    Collective."""
     maps = _maps(entries)
     hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():
@@ -260,7 +261,7 @@ def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
 
 
 def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
-    """Write the height files of a job's surface, unless they exist; collective. Raises InputError."""
+    """Write the height files of a job's surface, unless they exist. Collective. Raises InputError."""
 
     def write() -> None:
         for heights in (shape.heights for shape in surface if isinstance(shape, HeightArray)):
@@ -273,7 +274,7 @@ def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
 
 
 def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str, Any]:
-    """Return a stored job with absolute paths of its files of heights; root only.
+    """Return a stored job in which files of heights have absolute paths. Root only.
 
     These files are in the directory of the checkpoint, or in the parent of this directory. Raises InputError for a
     missing file, unless `elsewhere` is True, which means that the file may be in another place.

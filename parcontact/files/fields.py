@@ -46,7 +46,7 @@ class SavedMaps:
 
     @property
     def times(self) -> Array:
-        """Times of the instants of a run [s]; NaN for an instant without saved maps."""
+        """Times of the instants of a run [s], or NaN for an instant without saved maps."""
         return self.marks["t"]
 
     @property
@@ -60,8 +60,8 @@ class SavedMaps:
 
 
 class GrowingMaps:
-    """A file of maps of shape (place, y, x). Its space is laid out for all places before the first map is saved;
-    collective.
+    """A file of maps of shape (place, y, x). Its space is laid out for all places before the first map is saved.
+    Collective.
 
     To save a place, its maps are written first, and then its coordinates, which are NaN before. So a killed run leaves
     a readable file. `path` is the path of the file, `slab` the rows of this rank, and `size` the size of the box (lx,
@@ -78,7 +78,7 @@ class GrowingMaps:
     def replace_file(
         self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: list[int] | None = None
     ) -> None:
-        """Create a new file for `count` places; collective.
+        """Create a new file for `count` places. Collective.
 
         `kind` is `KIND` or `KIND_OF_STEADY_MAPS`. For a run, `steps` are the step numbers of all its instants, also of
         those that are not reached yet; for a curve, `steps` is None. Places of the present file `found` are copied:
@@ -116,7 +116,7 @@ class GrowingMaps:
 
 
 class SteadyMaps(GrowingMaps):
-    """Maps of the points of a friction curve; collective.
+    """Maps of the points of a friction curve. Collective.
 
     `path` is the path of the file, `slab` the rows of this rank, `size` the size of the box (lx, ly) [m], and `names`
     are the names of the maps. Each of the `points` is a velocity [m/s], a mean pressure [Pa] and optionally a
@@ -157,7 +157,7 @@ class SteadyMaps(GrowingMaps):
             self._rows = [next(free) if row is None else row for row in there]
 
     def save(self, index: int, maps: Mapping[str, Array]) -> None:
-        """Save the maps of a point; raises RunError."""
+        """Save the maps of a point. Raises RunError."""
         marks = dict(zip(self.axes, self.points[index], strict=True))
         named = {DATASETS[name]: maps[name] for name in self.names}
         hdf5.save_maps(self.path, self.slab, self._rows[index], named, marks)
@@ -255,7 +255,7 @@ class FieldsFile(GrowingMaps):
 
 
 def cut_back(path: Path, slab: Slab, step: int) -> str:
-    """Mark all instants after a step as not reached, in the file of a run that saves no more maps; collective.
+    """Mark all instants after a step as not reached, in the file of a run that saves no more maps. Collective.
 
     Return a message about lost maps, or ''. Raises InputError for a locked file.
     """
@@ -268,7 +268,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
 
 def _found(path: Path, slab: Slab) -> tuple[SavedMaps | None, str]:
-    """Return the contents of a field file, and a message about lost maps; collective.
+    """Return the contents of a field file, and a message about lost maps. Collective.
 
     An unreadable file is renamed. Raises InputError for a locked file.
     """

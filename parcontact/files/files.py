@@ -31,9 +31,10 @@ def without_mark(path: Path) -> Path:
 
 @contextmanager
 def replaced(path: Path, is_ours: Callable[[Path], bool] | None = None) -> Iterator[BinaryIO]:
-    """Open a new file that replaces `path` at the end of the context; after an error `path` is unchanged.
+    """Open a new file that replaces `path` at the end of the context. After an error `path` is unchanged.
 
-    With `is_ours`, a foreign file of this name is renamed, with a warning on standard error.
+    If the function `is_ours` is given and returns False for an existing file of this name, the existing file is
+    renamed, with a warning on standard error.
     """
     part = unused(path)
     try:
@@ -110,7 +111,7 @@ def replace_file(path: Path, text: str) -> None:
 
 
 def is_marked(path: Path) -> bool:
-    """Return True if a page or a picture has the MARK of this program; raises OSError."""
+    """Return True if a page or a picture has the `MARK` of this program. Raises OSError."""
     return MARK.encode() in path.read_bytes()
 
 
@@ -130,7 +131,8 @@ def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
 
 
 def put_aside(path: Path) -> Path | None:
-    """Rename a file to `NAME.aside`, or `NAME.aside-2` ...; returns the new path, or None if there is no file."""
+    """Rename a file to `NAME.aside`, or to `NAME.aside-2` and so on if such a file exists. Return the new path, or None
+    if there is no file."""
     if not os.path.lexists(path):
         return None
     number, target = 1, path.with_name(f"{path.name}.aside")

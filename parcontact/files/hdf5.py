@@ -1,8 +1,8 @@
 """Maps and provenance in HDF5 files: the runs that made a file, and the references to cite.
 
-Maps are written by MPI-IO if h5py supports it, else by the ranks in turn; both give the same files.
-A file has space for all maps before the first is written, and root writes everything else. Writing rows of maps does
-not change the structure, so a killed run leaves a readable file. An error on one rank is raised on all as RunError.
+Maps are written by MPI-IO if h5py supports it, else by the ranks in turn; both give the same files. A file has space
+for all maps before the first map is written, and root writes everything else. Writing rows of maps does not change the
+structure of the file, so a killed run leaves a readable file. An error on one rank is raised on all ranks as RunError.
 """
 
 import errno
@@ -46,12 +46,12 @@ class Slice(NamedTuple):
 
 
 def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
-    """Write the rows of every rank to their places; collective."""
+    """Write the rows of every rank to their places. Collective."""
     _move(path, slab, list(parts), True)
 
 
 def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
-    """Read the rows of every rank from a file into the arrays `rows` of all `parts`; collective."""
+    """Read the rows of every rank from a file into the arrays `rows` of all `parts`. Collective."""
     _move(path, slab, list(parts), False)
 
 
@@ -73,7 +73,7 @@ def open_results(path: Path) -> h5py.File:
 
 
 def sync(path: Path, slab: Slab) -> None:
-    """Flush the data of all ranks to disk; collective."""
+    """Flush the data of all ranks to disk. Collective."""
     problem = ""
     try:
         sync_one(path)
@@ -91,7 +91,7 @@ def sync_one(path: Path) -> None:
 
 
 def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
-    """Run `action` on root and return its result on all ranks; collective. If it fails, raise `kind` on all ranks, with
+    """Run `action` on root and return its result on all ranks. Collective. If it fails, raise `kind` on all ranks, with
     a message that begins with `what`."""
 
     def attempt() -> T:
@@ -104,13 +104,14 @@ def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exc
 
 
 def raise_first(slab: Slab, problem: str) -> None:
-    """Raise RunError on all ranks with the `problem` of the first rank that has one ('' for none); collective."""
+    """Raise RunError on all ranks with the `problem` of the first rank that has a problem. `problem` is '' on ranks
+    without a problem. Collective."""
     if problem := next((text for text in slab.from_all(problem) if text), ""):
         raise RunError(problem)
 
 
 def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
-    """Write or read rows at their places; collective. If a rank cannot take part, all ranks raise before any access."""
+    """Write or read rows at their places. Collective. If a rank cannot take part, all ranks raise before any access."""
     what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
     try:
         os.close(os.open(path, os.O_RDWR if writes else os.O_RDONLY))
@@ -129,7 +130,7 @@ def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
 
 
 def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
-    """Return the offset of this rank's rows in the file [bytes]; raises ValueError for another type or shape."""
+    """Return the offset of this rank's rows in the file [bytes]. Raises ValueError for another type or shape."""
     if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
         kinds = f"{dataset.dtype} {dataset.shape}; {part.rows.dtype} with rows {part.rows.shape} was expected"
         raise ValueError(f"{part.name} is of {kinds}")
@@ -140,7 +141,7 @@ def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
 
 
 def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
-    """Access the file by one rank after the other; returns the failure on this rank, or ''."""
+    """Access the file by one rank after the other. Return the failure on this rank, or ''."""
     problem = ""
     for rank in range(slab.comm.size):
         if rank == slab.comm.rank and slab.shape[0]:
@@ -157,7 +158,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
-    """Access the file by all ranks at once, by MPI-IO; returns the failure on this rank, or ''."""
+    """Access the file by all ranks at once, by MPI-IO. Return the failure on this rank, or ''."""
     problem = ""
     try:
         file = MPI.File.Open(slab.comm, str(path), MPI.MODE_RDWR if writes else MPI.MODE_RDONLY)
@@ -179,7 +180,7 @@ def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
-    """Create a file on root and fill it by `build(file)`; collective.
+    """Create a file on root and fill it by `build(file)`. Collective.
 
     The file begins with `block` empty bytes. All its maps together take `size` bytes, for which the free space on disk
     and the limit on file sizes are tested first.
@@ -200,7 +201,7 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: in
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
-    """Change attributes of fixed size on root by `act(file)`; collective."""
+    """Change attributes of fixed size on root by `act(file)`. Collective."""
 
     def apply() -> None:
         with h5py.File(path, "r+", locking=False) as file:
@@ -210,7 +211,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
 
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
-    """Write existing small datasets by name; root only."""
+    """Write existing small datasets by name. Root only."""
     with h5py.File(path, "r", locking=False) as file:
         places = {name: file[name].id.get_offset() for name in values}
         types = {name: file[name].dtype for name in values}
@@ -221,7 +222,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
-    """Write the maps of an instant or point, and then its coordinates `marks`; collective."""
+    """Write the maps of an instant or of a point, and then the coordinates `marks` of this place. Collective."""
     write_rows(
         path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
     )
@@ -229,7 +230,7 @@ def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], mar
 
 
 def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
-    """Set coordinates of one place, or of all places that `index` selects; collective. Places are instants or points.
+    """Set coordinates of one place, or of all places that `index` selects. Collective. Places are instants or points.
     `marks` maps the names of the coordinates to their values; NaN marks a place whose maps are not saved."""
 
     def act() -> None:
@@ -266,7 +267,8 @@ def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None
 def add_maps(
     file: h5py.File, slab: Slab, size: tuple[float, float], units: Mapping[str, str], leading: Sequence[str]
 ) -> None:
-    """Add coordinates x and y [m] of a box of this `size`, and space for maps (n, y, x) with `units` by name.
+    """Add the coordinates x and y [m] of a box of this `size`, and space for maps of shape (n, y, x). `units` maps the
+    names of the maps to their units.
 
     `leading` are the names of the existing coordinates along the first axis.
     """
@@ -354,7 +356,8 @@ class Provenance:
 
 
 def read_budget(file: h5py.File) -> dict[str, Any]:
-    """Return the error budget of the run so far: relative errors of friction and area by source, or {}."""
+    """Return the error budget of the run so far: relative errors of friction and area, by source. Return {} if the file
+    has none."""
     return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 

@@ -63,8 +63,8 @@ class Outputs:
         return tuple(filter(None, (self.table, *self.tables, self.maps, self.log, *self.others)))
 
     def changes(self, then: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-        """Return the differences for which results of the job `then` cannot be continued with the job `now`, as a text;
-        '' if there are none. Both jobs are plain data."""
+        """Return the differences for which results of the job `then` cannot be continued with the job `now`, as a text,
+        or '' if there are none. Both jobs are plain data."""
         return differences(then, now, self.same)
 
     @property
@@ -127,9 +127,9 @@ SHOWN = 4  # most differences of two jobs in a message
 class Claim:
     """Record of a command in an output directory.
 
-    `job` has the sections of its job, and `id` is the id of its run. `saved` is True after the first checkpoint.
-    `finished` is the last step and its time [s] (for a curve: the number of points and 0), None before the end.
-    `detached` is a sentence on how the surfaces detached, or ''.
+    `job` has the sections of the job of this command, and `id` is the id of its run. `saved` is True after the first
+    checkpoint. `finished` is the last step and its time [s], or for a curve the number of points and 0; it is None
+    before the end. `detached` is a sentence on how the surfaces detached, or ''.
     """
 
     job: dict[str, Any]
@@ -145,7 +145,8 @@ def kept(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_claims(directory: Path) -> dict[str, Claim]:
-    """Return the records of commands in a directory, by verb; empty without a marker. Raises OSError or ValueError."""
+    """Return the records of commands in a directory, by verb. The result is empty for a directory without a marker.
+    Raises OSError or ValueError."""
     path = directory / MARKER
     try:
         text = path.read_bytes()
@@ -170,7 +171,7 @@ def sound_claims(directory: Path) -> dict[str, Claim]:
 
 
 def detached(directory: Path) -> str:
-    """Return how the surfaces of a run detached for good, '' if they did not; raises InputError."""
+    """Return a sentence on how the surfaces of a run detached for good, or '' if they did not. Raises InputError."""
     claim = sound_claims(directory).get("run")
     return "" if claim is None else claim.detached
 
@@ -185,8 +186,9 @@ def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
 
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Return the first differences of two jobs (plain data) in the named sections (`grid`) or keys (`numerics.kernel`),
-    with both values, and the number of further ones; '' if there is none."""
+    """Return a text on the first differences of two jobs (plain data) in the named sections (`grid`) or keys
+    (`numerics.kernel`). It states both values of each, and the number of further differences. Return '' if there is
+    none."""
     old, new = dict(_leaves("", then)), dict(_leaves("", now))
     keys = (key for name in names for key in {**old, **new} if f"{key}.".startswith(f"{name}."))
     found = [f"{key} was {old.get(key)}, is {new.get(key)}" for key in keys if old.get(key) != new.get(key)]
@@ -249,7 +251,7 @@ class Directory:
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """Lock the directory within the context, and create it if it is missing; collective. A created directory that
+        """Lock the directory within the context, and create it if it is missing. Collective. A created directory that
         is still empty at the end is removed."""
         try:
             self._on_root(self._lock_and_read)
@@ -258,7 +260,7 @@ class Directory:
             self._release()
 
     def refuse_foreign(self, job: Path, data: Mapping[str, Any], afresh: bool) -> None:
-        """Raise InputError for foreign files, or for results of another job than `data` (plain data); collective."""
+        """Raise InputError for foreign files, or for results of another job than `data` (plain data). Collective."""
 
         def look() -> None:
             if not self.claims and not afresh and not self._has_checkpoints():
@@ -269,7 +271,7 @@ class Directory:
         self._on_root(look)
 
     def make(self, job: Path, resolved: str, claim: Claim) -> None:
-        """Write the marker file and the job; collective. Raises InputError if the directory cannot be written."""
+        """Write the marker file and the job. Collective. Raises InputError if the directory cannot be written."""
 
         def act() -> None:
             self._rename_foreign_files(job)
@@ -301,7 +303,7 @@ class Directory:
         self._on_root(act)
 
     def clear(self) -> None:
-        """Remove files of earlier runs of this command; collective.
+        """Remove files of earlier runs of this command. Collective.
 
         Call this after `make`, which renames foreign files: files with the names of results are removed here.
         """
@@ -314,7 +316,7 @@ class Directory:
         self._on_root(act)
 
     def go_back(self, step: int) -> None:
-        """Rename the checkpoints of later steps than `step`, and remove unfinished files; collective."""
+        """Rename the checkpoints of steps later than `step`, and remove unfinished files. Collective."""
 
         def act() -> None:
             for path in self._unfinished():
@@ -326,25 +328,25 @@ class Directory:
         self._on_root(act)
 
     def prune(self, keep: int) -> None:
-        """Remove all but the newest `keep` checkpoints; root only."""
+        """Remove all checkpoints but the newest ones, whose number is `keep`. Root only."""
         with suppress(OSError):  # superfluous checkpoints do no harm
             for _, path in self.saved()[keep:]:
                 path.unlink()
 
     def note(self, **facts: Any) -> None:
-        """Set fields (`facts`) of this command's record (`Claim`) in the marker file; root only. Errors of
-        writing are ignored."""
+        """Set fields (`facts`) of this command's record (`Claim`) in the marker file. Root only. Errors of writing are
+        ignored."""
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
                 write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
-        """Return steps and paths of the checkpoints of this verb, the newest first; root only."""
+        """Return steps and paths of the checkpoints of this verb, the newest first. Root only."""
         return find_checkpoints(self.path) if self.outputs.checkpoints else []
 
     def results(self) -> list[str]:
-        """Return the names of this verb's existing results; root only."""
+        """Return the names of this verb's existing results. Root only."""
         found = [name for name in (self.outputs.table, self.outputs.maps) if name and (self.path / name).exists()]
         return [*found, *(path.name for _, path in self.saved())]
 
@@ -372,7 +374,7 @@ class Directory:
                     files.put_aside(self.path / name)
 
     def _on_root(self, act: Callable[[], None]) -> None:
-        """Call `act` on root; collective. Raises InputError on all ranks if it fails."""
+        """Call `act` on root. Collective. Raises InputError on all ranks if it fails."""
         hdf5.write_on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
 
     # -- the lock ------------------------------------------------------------------------------------------------------
@@ -389,7 +391,7 @@ class Directory:
             ) from error
 
     def _take_lock(self) -> None:
-        """Take the lock, which the system releases when this process ends; raises InUseError."""
+        """Take the lock, which the system releases when this process ends. Raises InUseError."""
         deadline = time.monotonic() + MAX_SECONDS_TO_RELEASE
         path = self.path / LOCK
         while True:

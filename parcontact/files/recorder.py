@@ -1,9 +1,9 @@
 """Rows and maps of a run while it goes on, in files and in a terminal.
 
-* measures.csv: a row per step and one for the initial state, written by root; the columns of this table.
-* The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal.
+* measures.csv and its columns: root writes a row for the initial state and one for each step.
+* The console and run.log: root prints a line for each step, messages and warnings, and on a terminal a progress bar.
 * The first lines of run.log: facts about the machine and the program, for diagnosis.
-* The growing files of a run: run.log, measures.csv and fields.h5, begun or continued.
+* The growing files of a run: run.log, measures.csv and fields.h5, which are begun or continued.
 """
 
 import math
@@ -41,7 +41,8 @@ from .tables import MEND, GrowingTable, whole_lines
 
 @dataclass(frozen=True)
 class StepRow:
-    """Record of one instant of a run, a row of measures.csv. Values are in SI units, energies since the start.
+    """Record of one instant of a run, a row of measures.csv. Values are in SI units. Energies count from the start of
+    the run.
 
     `errors` is the error budget of the instant, None if nothing is in contact. `added` are the values of the columns of
     effects. `remark` is a sentence for run.log about an unusual step, or ''.
@@ -66,18 +67,19 @@ class StepRow:
 
     @property
     def error_friction(self) -> float:
-        """Return the estimated relative error of friction; 1 or more if friction may be 0, NaN if unknown."""
+        """Return the estimated relative error of friction. It is 1 or more if friction may be 0, and NaN if it is
+        unknown."""
         return self.errors.friction.of_friction if self.errors and self.errors.friction else math.nan
 
     @property
     def error_area(self) -> float:
-        """Return the estimated relative error of the contact area, NaN if unknown."""
+        """Return the estimated relative error of the contact area, or NaN if it is unknown."""
         return self.errors.area.total if self.errors else math.nan
 
     @property
     def error_gap(self) -> float:
-        """Return the estimated relative error of the mean gap. It equals the relative error of the share of the surface
-        that is open. Return NaN in full contact or if it is unknown."""
+        """Return the estimated relative error of the mean gap, which equals the relative error of the share of the
+        surface that is open. Return NaN in full contact, or if the error is unknown."""
         area = self.measures.contact_area_corrected
         return self.error_area * area / (1.0 - area) if area < 1.0 else math.nan
 
@@ -94,7 +96,7 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
 
 
 def row_numbers(row: StepRow, branches: int) -> list[float]:
-    """Return the values of a row in the order of `columns`; NaN for energies that the job does not request."""
+    """Return the values of a row in the order of `columns`. Energies that the job does not request are NaN."""
     return [*values_of(_always(branches), row), *row.added]
 
 
@@ -125,7 +127,7 @@ def cut_back_table(
     """Remove rows after `step`, and an incomplete row, and change the columns to those of the present job.
 
     `then` is the table's state when the checkpoint was written: its last row is added if it is missing because the disk
-    was full. Returns the new state and messages on lost rows. Raises InputError for a damaged file, which is not
+    was full. Return the new state and messages on lost rows. Raises InputError for a damaged file, which is not
     changed.
     """
     if not path.exists():
@@ -163,7 +165,7 @@ LEFT_SECONDS = 30.0  # tuning: time between lines with the time left, without a 
 
 
 def step_line(row: StepRow) -> str:
-    """Return the line on a step that a run prints under the heading `HEAD`."""
+    """Return the line that a run prints for a step, with columns as in the heading `HEAD`."""
     m = row.measures
     return (
         f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {m.friction:9.6f} "
@@ -172,17 +174,18 @@ def step_line(row: StepRow) -> str:
 
 
 def warnings_of(log: Path) -> list[str]:
-    """Return all different warnings in a log, in order; an empty list without a log."""
+    """Return all different warnings in a log, in order, or an empty list without a log."""
     return list(dict.fromkeys(line.removeprefix(WARNING) for line in log_lines(log) if line.startswith(WARNING)))
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return the last message of a log on chosen meshes (`march.mesh`); an empty list if there is none."""
+    """Return the last message of a log on chosen meshes (`march.mesh`) as a list of lines, which is empty if there is
+    none."""
     return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 
 def log_lines(log: Path) -> list[str]:
-    """Return the lines of a log without time stamps; an empty list without a log."""
+    """Return the lines of a log without time stamps, or an empty list without a log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
 
@@ -402,7 +405,7 @@ class Recorder:
             self.console.warn(self._fields.trouble)
 
     def close(self) -> None:
-        """Close the log and the table; not collective; raises nothing."""
+        """Close the log and the table. This method is not collective, and raises nothing."""
         self.console.close()
         if self._measures:
             self._measures.close()

@@ -38,7 +38,7 @@ class _StopError(Exception):
 
 
 def run_history(job: Job, slab: Slab, options: Options) -> int:
-    """Run a job, or continue it; collective. Return the exit code. Nothing is written before the job is checked."""
+    """Run a job, or continue it. Collective. Return the exit code. Nothing is written before the job is checked."""
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: auto or never was expected for a job in bands, got {options.restart}: {RENEWED}")
     job = ended(job, options.until)
@@ -85,7 +85,7 @@ def ended(job: Job, until: float | None) -> Job:
 
 
 def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -> tuple[bool, str]:
-    """Return whether a run of the same job is to go on, and why there is nothing to do, or ''; collective. Raises
+    """Return whether a run of the same job is to go on, and why there is nothing to do, or ''. Collective. Raises
     InputError for a directory of another job."""
     directory.refuse_foreign(job.path, plain, afresh)
 
@@ -181,7 +181,7 @@ class _Run:
             self._bar.print(text)
 
     def _write(self) -> list[StepRow]:
-        """Write both tables, and return the rows; root only."""
+        """Write both tables, and return the rows. Root only."""
         self._say(HEAD)
         rows, bands = list[StepRow](), list[list[float]]()
         for row, of_bands in self.road.records():

@@ -69,7 +69,8 @@ class Run:
         self.began, self.saving = time.monotonic(), 0.0
 
     def go(self, saved: Contents | None) -> int:
-        """Run to the end, from the start or from the checkpoint `saved`; returns the exit code. Raises RunError."""
+        """Run to the end of the history, from its start or from the checkpoint `saved`. Return the exit code. Raises
+        RunError."""
         self._log_start(saved)
         if saved:
             self.recorder.catch_up(self.march.row, self.march.field)
@@ -94,7 +95,7 @@ class Run:
     # -- after every step -------------------------------------------------------------------------------------------
 
     def record(self, march: March) -> None:
-        """Write the row of the last step, and its maps if they are due, and warn about its contact."""
+        """Write the row of the last step, and the maps after this step if they are due. Warn about the contact."""
         row = march.row
         if row.remark:
             self.console.say(row.remark)
@@ -112,7 +113,7 @@ class Run:
             self.recorder.renew(provenance)
 
     def decide(self, march: March) -> bool:
-        """Save if a checkpoint is due; return True if the run is to end after this step."""
+        """Write a checkpoint if it is due. Return True if the run is to end after this step."""
         row = march.row
         verdict = self.watch.decide(row.step, row.step > self.first, self.recorder.problem)
         if verdict.problem:
@@ -126,7 +127,7 @@ class Run:
     # -- saving -----------------------------------------------------------------------------------------------------
 
     def save(self, last: bool = False) -> None:
-        """Write a checkpoint; raises RunError if results were lost or cannot be written."""
+        """Write a checkpoint. Raises RunError if results were lost or cannot be written."""
         self._write(last)
         self._refuse_lost_results()
 
@@ -135,7 +136,7 @@ class Run:
             raise RunError(problem + self._leave_checkpoint())
 
     def _leave_checkpoint(self) -> str:
-        """Write a checkpoint of the last good step; returns a message."""
+        """Write a checkpoint of the last good step. Return a message."""
         try:
             if self.saved != self.march.row.step:
                 self._write(last=True)
@@ -199,7 +200,7 @@ class Run:
         self.console.log(f"counts on root: {counts}")
 
     def _log_summary(self) -> int:
-        """Report the end of the run and its errors, and note the end in its directory; returns the exit code."""
+        """Report the end of the run and its errors, and note the end in its directory. Return the exit code."""
         row, console, errors = self.march.row, self.console, self.march.state.errors
         slides = any(stage.slides for stage in self.job.history)
         self._log_counts()
@@ -290,12 +291,12 @@ class Ended:
 
 
 def run_job(job: Job, slab: Slab, options: Options) -> int:
-    """Run a job; collective. Returns the exit code. Nothing is written before the whole job is checked."""
+    """Run a job. Collective. Return the exit code. Nothing is written before the whole job is checked."""
     return run_to_end(job, slab, options).code
 
 
 def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
-    """Run a job, as `run_job`; returns its end, from which a run can continue in memory."""
+    """Run a job like `run_job`. Return the end of the run, from which another run can continue in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
         plain = listing.plain_job(job) if slab.root else {}
@@ -329,7 +330,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
 def _find_origin(
     job: Job, plain: dict[str, Any], directory: Directory, options: Options
 ) -> tuple[RestartPoint | None, list[str], str]:
-    """Return the checkpoint to continue from, or None; warnings; and why there is nothing to do, or ''; collective."""
+    """Return the checkpoint to continue from, or None; warnings; and why there is nothing to do, or ''. Collective."""
     slab, until = directory.slab, options.until
     timeline = Timeline.from_job(job, until or 0.0)
     asked = timeline.end
@@ -377,7 +378,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
 def _open_files(
     march: March, directory: Directory, claim: Claim, facts: Facts, origin: RestartPoint | None, options: Options
 ) -> Recorder:
-    """Prepare the output directory, and open its files; collective."""
+    """Prepare the output directory, and open its files. Collective."""
     job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.effects)
     timeline = march.timeline(options.until or 0.0)
     recorder.columns(0, added)  # raises InputError for repeated names
@@ -400,7 +401,7 @@ def _open_files(
 
 
 def _end_of(job: Job, saved: Saved) -> Detached | None:
-    """Return the end of a run in the entries of its law in a checkpoint; None if it goes on."""
+    """Return the end of a run in the entries of its law in a checkpoint, or None if it goes on."""
     return next(filter(None, (ended(job, saved) for ended in job.asked("ended"))), None)
 
 
@@ -410,7 +411,7 @@ def _end_of(job: Job, saved: Saved) -> Detached | None:
 def choose_origin(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
 ) -> tuple[RestartPoint | None, list[str]]:
-    """Return the checkpoint to continue from, or None, and warnings about skipped checkpoints; collective.
+    """Return the checkpoint to continue from, or None, and warnings about skipped checkpoints. Collective.
 
     `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
     InputError if no existing checkpoint is usable, or if a start from the beginning would replace results.
@@ -442,7 +443,7 @@ def claim_of(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
 def finished_before(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, timeline: Timeline
 ) -> str:
-    """Return a message if a run of this job finished earlier without keeping a checkpoint, else ''; collective."""
+    """Return a message if a run of this job finished earlier without keeping a checkpoint, else ''. Collective."""
 
     def look() -> str:
         claim = directory.claim
@@ -458,7 +459,7 @@ def finished_before(
 
 
 def sound_checkpoint(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
-    """Return the contents of a checkpoint from which a job can continue, or a text on why it cannot; collective.
+    """Return the contents of a checkpoint from which a job can continue, or a text on why it cannot. Collective.
 
     Raises InputError if the history before the checkpoint differs.
     """
@@ -483,7 +484,7 @@ def _refuse_changed_steps(found: Contents, job: Job, plain: Mapping[str, Any]) -
 def _is_own(contents: Contents, directory: Directory) -> bool:
     """Return True if a checkpoint belongs to the run in the directory, by its id or its file.
 
-    Raises InputError for a checkpoint of another run if the directory has results; root only.
+    Raises InputError for a checkpoint of another run if the directory has results. Root only.
     """
     if directory.claim is not None and contents.run:
         own = contents.run == directory.claim.id
@@ -496,7 +497,7 @@ def _is_own(contents: Contents, directory: Directory) -> bool:
 
 
 def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
-    """Raise InputError for results that a new run would replace although no checkpoint can restore them; root only.
+    """Raise InputError for results that a new run would replace although no checkpoint can restore them. Root only.
 
     Results of a run of this job that ended before its first checkpoint may be replaced.
     """
@@ -512,7 +513,7 @@ def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
 
 
 def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
-    """Return the contents of a checkpoint, or why it cannot be used; root only."""
+    """Return the contents of a checkpoint, or why it cannot be used. Root only."""
     try:
         contents = checkpoint.inspect(path)
         if found := outputs.RUN.changes(contents.job, plain):
@@ -523,8 +524,8 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Return a message on the first completed step of a checkpoint that differs from the same step of this job, or ''.
-    Later steps may differ."""
+    """Return a message on the first completed step of a checkpoint that differs from the same step of this job, or ''
+    if no completed step differs. Later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
     kind: Any = type(job).model_fields["history"].annotation
     history = TypeAdapter(kind).validate_python(contents.job["history"])

@@ -22,7 +22,7 @@ from .outputs import Directory
 
 @dataclass(frozen=True)
 class StopFile:
-    """A stop file shared by all programs of a sweep, which none of them removes.
+    """A stop file shared by all programs of a sweep. None of these programs removes it.
 
     The file stops programs that are running when it is created or touched: a file that was last changed at the time
     `before` [ns] has no effect. The ranks of one program stop each other by a second file, `own`.
@@ -54,7 +54,7 @@ class StopFile:
 
 
 def remove(path: Path) -> str:
-    """Remove a stop file; returns a message if this fails, or ''."""
+    """Remove a stop file. Return a message if this fails, or ''."""
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
@@ -132,7 +132,7 @@ class Watch:
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """Return the decision after a step; collective. `began` is True if this run has made a step, and `problem` is a
+        """Return the decision after a step. Collective. `began` is True if this run has made a step, and `problem` is a
         failure on root, or ''."""
         now = time.monotonic()
         if began:
@@ -181,7 +181,7 @@ class Watch:
 
 @contextmanager
 def watching(directory: Directory, rules: Checkpoint, options: Options) -> Iterator[Watch]:
-    """Yield the watch of a run or a curve, which notes signals within the context."""
+    """Yield the object that watches a run or a curve for reasons to stop. Within the context it notes signals."""
     limit = limit_time(options.wall) if directory.slab.root else None
     with Signals().noted() as signals:
         yield Watch(directory.slab, rules, directory.stop_file, signals, limit, options.sweep_stop_file)

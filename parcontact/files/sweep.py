@@ -75,13 +75,13 @@ class SweepRun:
         return {}
 
     def run(self, chosen: Sequence[Case]) -> int:
-        """Run the selected cases and collect the results of all cases; returns the exit code.
+        """Run the selected cases and collect the results of all cases. Return the exit code.
 
-        A failed case does not stop the others, but gives exit code 1; if all cases are refused as bad input, it is 2.
-        Finished cases, and cases that another program runs, are skipped; if only such a running case is selected,
-        InUseError is raised. A case that stops early with a checkpoint stops the sweep with the cases that run at the
-        same time, but no other program. So do signals and the end of the wall time. The file `stop` also stops other
-        programs and is not removed. The same command continues the sweep.
+        A failed case does not stop the others, but gives exit code 1; if all cases are refused as bad input, the code
+        is 2. Finished cases, and cases that another program runs, are skipped. If the only selected case runs in
+        another program, InUseError is raised. A case that stops early with a checkpoint stops the sweep with the cases
+        that run at the same time, but no other program. So do signals and the end of the wall time. The file `stop`
+        also stops other programs and is not removed. The same command continues the sweep.
         """
         directory = _directory(self.cases)
         new = [path for path in (directory / CASES, directory, *directory.parents) if not path.exists()]
@@ -111,14 +111,14 @@ class SweepRun:
         return BAD_INPUT if refused else FAILED if {FAILED, BAD_INPUT} & set(codes) else DONE
 
     def _record_refusals(self, refusals: Mapping[int, str]) -> None:
-        """Record that cases were refused, by their numbers, if `act` runs them; root only."""
+        """Record that cases were refused, by their numbers, if `act` runs them. Root only."""
         if refusals and self.runs:
             for number, reason in refusals.items():
                 note_failure(self.cases[number], reason)
             self._collect()
 
     def _report_errors(self, chosen: Sequence[Case]) -> None:
-        """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy; root only."""
+        """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy. Root only."""
         asked = {case.number: case.job.numerics.asked.both for case in chosen}
         for k, found in enumerate(sweep_errors(chosen)):
             if not found:
@@ -131,7 +131,7 @@ class SweepRun:
                 print_line(f"warning: {more}; the log of each case says how to reduce it", sys.stderr)
 
     def _take(self, own: Sequence[Case], signals: Signals) -> list[int]:
-        """Run the cases of this group; returns their exit codes. If it stops early, the other groups stop too."""
+        """Run the cases of this group. Return their exit codes. If it stops early, the other groups stop too."""
         codes, side_by_side = list[int](), self.groups.count > 1
         for case in own:
             slab = Slab(self.groups.comm, *case.job.grid.points)
@@ -155,7 +155,7 @@ class SweepRun:
         return codes
 
     def _collect(self) -> int:
-        """Write the tables of the sweep; returns the exit code, FAILED if they cannot be written. Root only."""
+        """Write the tables of the sweep. Return the exit code, FAILED if they cannot be written. Root only."""
         directory = _directory(self.cases)
         try:
             write_sweep_tables(directory, self.cases)
@@ -168,7 +168,7 @@ class SweepRun:
         return DONE
 
     def _reason_to_stop(self, slab: Slab, signals: Signals) -> str:
-        """Return why no further case begins, or ''; signals may reach any rank; collective."""
+        """Return why no further case begins, or ''; signals may reach any rank. Collective."""
         if slab.reduce((), [float(signals.stop)])[0]:
             return stopping.REASONS[stopping.SIGNAL]
         used_up = self.limit is not None and time.monotonic() + stopping.RESERVE_SECONDS > self.limit
@@ -181,7 +181,7 @@ class SweepRun:
         return STOPPED_EARLY
 
     def _attempt(self, case: Case, slab: Slab, alone: bool) -> int:
-        """Run a case and return its exit code; raises InUseError if another program runs it and it is `alone`."""
+        """Run a case and return its exit code. Raises InUseError if another program runs it and it is `alone`."""
         self.doubts.begin(case.number)
         reason = ""
         try:
@@ -209,7 +209,7 @@ def print_line(text: str, file: TextIO | None = None) -> None:
 
 
 def _deal(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
-    """Return the cases of this rank's group; unfinished cases are divided evenly among groups; collective."""
+    """Return the cases of this rank's group; unfinished cases are divided evenly among groups. Collective."""
     if groups.count == 1:
         return chosen
     order: list[int] = groups.agree(unfinished_first(chosen) if groups.root else [])
@@ -217,7 +217,7 @@ def _deal(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
 
 
 def unfinished_first(chosen: Sequence[Case]) -> list[int]:
-    """Return the indices of cases, unfinished ones first; root only."""
+    """Return the indices of the cases. Unfinished cases come first. Root only."""
     finished = [state_of(case) == "done" for case in chosen]
     return sorted(range(len(chosen)), key=lambda index: (finished[index], index))
 
@@ -230,7 +230,7 @@ def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
 
 def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     """Raise InputError if the directory of a sweep has foreign files or files of another job, or a link in place of a
-    case's directory; root only."""
+    case's directory. Root only."""
     directory, first = _directory(cases), cases[0]
     for path in (directory / CASES, *(case.job.output.directory for case in cases)):
         if path.is_symlink():
@@ -250,7 +250,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
 
 
 def warn_once(cases: Sequence[Case]) -> list[Doubt]:
-    """Print the warnings about the jobs of cases, one per subject; root only. Returns all warnings."""
+    """Print the warnings about the jobs of cases, one per subject. Root only. Return all warnings."""
     for text in sentences_of(cases, lambda job: job.doubts):
         print(f"warning: {text}", file=sys.stderr, flush=True)
     return [doubt for case in cases for doubt in case.job.doubts]
@@ -269,7 +269,7 @@ def _directory(cases: Sequence[Case]) -> Path:
 
 
 def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
-    """Write all tables of a sweep from the results of its cases; root only. Several programs may write them at the same
+    """Write all tables of a sweep from the results of its cases. Root only. Several programs may write them at the same
     time."""
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
@@ -308,8 +308,8 @@ def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
 
 
 def note_failure(case: Case, reason: str) -> None:
-    """Store the reason why a case failed in the directory of the case; an empty `reason` removes a stored one. Root
-    only."""
+    """Store the reason why a case failed in the directory of the case. If `reason` is '', a stored reason is removed.
+    Root only."""
     path = case.job.output.directory / FAILURE
     with suppress(OSError):
         if reason:
@@ -374,7 +374,7 @@ def _columns(path: Path) -> dict[str, list[float]]:
 
 
 def state_of(case: Case) -> str:
-    """Return the state of a case: done | failed | begun | damaged | -."""
+    """Return the state of a case: "done", "failed", "begun", "damaged", or "-" for a case that has not begun."""
     directory = case.job.output.directory
     if case.job.history and tables.find_lost_rows(directory):
         return DAMAGED

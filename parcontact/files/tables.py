@@ -28,7 +28,7 @@ class GrowingTable:
     """A csv table that grows while others read it; a last line without newline is incomplete."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
-        """Open the file to append, or create it with the names of the columns; raises OSError."""
+        """Open the file to append, or create it with the names of the columns. Raises OSError."""
         self.path = path
         self._file = files.open_to_append(path)
         if self._file.tell() == 0:
@@ -50,13 +50,13 @@ class GrowingTable:
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Close the file; raises nothing."""
+        """Close the file. Raises nothing."""
         with suppress(OSError):
             self._file.close()
 
 
 def whole_lines(path: Path) -> Iterator[list[str]]:
-    """Yield the cells of each whole line, first the names of the columns; raises InputError for unequal lengths."""
+    """Yield the cells of each whole line, first the names of the columns. Raises InputError for unequal lengths."""
     count = 0
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
@@ -81,9 +81,9 @@ class Columns(dict[str, list[float]]):
 
 
 def read_columns(path: Path) -> Columns:
-    """Return the columns of a table by name, also of a growing table; empty cells are NaN.
+    """Return the columns of a table by name. The table may be growing. Empty cells are NaN.
 
-    Raises InputError with the line for anything but numbers.
+    Raises InputError, with the line, for a cell that is no number.
     """
     rows = whole_lines(path)
     names = next(rows, [])
@@ -105,7 +105,8 @@ Place = tuple[float, ...]  # speed [m/s], mean pressure [Pa], and temperature [d
 
 
 class Wanted(NamedTuple):
-    """Parameters of a steady state: speed [m/s], mean pressure [Pa], temperature [deg C] (NaN: of the material)."""
+    """Parameters of a steady state: speed [m/s], mean pressure [Pa] and temperature [deg C]. If the temperature is NaN,
+    that of the material counts."""
 
     speed: float
     pressure: float
@@ -154,7 +155,7 @@ class LostPoint(NamedTuple):
 
 
 def read(directory: Path) -> list[LostPoint]:
-    """Return the lost points of a curve, except points that were solved later; raises InputError for a damaged file."""
+    """Return the lost points of a curve, except points that were solved later. Raises InputError for a damaged file."""
     path = directory / outputs.LOST
     if not path.is_file():
         return []
@@ -174,7 +175,7 @@ def without(lost: Sequence[LostPoint], solved: Sequence[Wanted]) -> list[LostPoi
 
 
 def write(directory: Path, lost: Sequence[LostPoint]) -> None:
-    """Write the lost points of a curve, or remove the file if there is none; raises OSError."""
+    """Write the lost points of a curve, or remove the file if there is none. Raises OSError."""
     if not lost:
         (directory / outputs.LOST).unlink(missing_ok=True)
         return
@@ -184,8 +185,8 @@ def write(directory: Path, lost: Sequence[LostPoint]) -> None:
 
 
 def name_lost(directory: Path) -> str:
-    """Return a text on the lost points of a curve: "13 of 15 points, without 10 m/s under 200 kPa at 20, 60 C: why"; ''
-    if there is none. Raises InputError for a damaged file."""
+    """Return a text on the lost points of a curve, such as "13 of 15 points, without 10 m/s under 200 kPa at 20, 60 C:
+    why". Return '' if there is none. Raises InputError for a damaged file."""
     if not (lost := read(directory)):
         return ""
     solved = len(read_columns(directory / outputs.STEADY.table)["velocity"])
@@ -216,7 +217,8 @@ MEND_CUT = "correct it, or move it away"
 
 
 def read_results(path: Path) -> Columns:
-    """Return the columns of a table of results by name. Raises InputError if it is damaged, foreign or incomplete."""
+    """Return the columns of a table of results by name. Raises InputError if the table is damaged, foreign or
+    incomplete."""
     lasts = list(_find_ends(path))  # read before the table, which may grow
     columns = read_columns(path)
     if path.name not in GROWING:
@@ -244,7 +246,7 @@ def refuse_cut(path: Path) -> None:
 
 
 def find_lost_rows(directory: Path) -> str:
-    """Return a message if the table of a finished run is damaged or lacks rows, or ''; raises InputError for an
+    """Return a message if the table of a finished run is damaged or lacks rows, or ''. Raises InputError for an
     unreadable marker."""
     claim = outputs.sound_claims(directory).get("run")
     if claim is None or claim.finished is None:

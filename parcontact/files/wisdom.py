@@ -25,7 +25,7 @@ from .recorder import processor
 
 
 def gather(slab: Slab) -> NDArray[np.uint8]:
-    """Return the FFTW wisdom of all ranks, for a checkpoint; collective."""
+    """Return the FFTW wisdom of all ranks, for a checkpoint. Collective."""
     everyone = [wisdom.decode("latin-1") for wisdom in slab.from_all(export_wisdom())]
     different = list(dict.fromkeys(everyone))
     text = json.dumps({"plans": different, "of": [different.index(wisdom) for wisdom in everyone]})
@@ -48,7 +48,7 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Store the wisdom of this run for later runs; collective. A stored wisdom that is at least as large has at least
+    """Store the wisdom of this run for later runs. Collective. A stored wisdom that is at least as large has at least
     as many transforms, and is kept."""
     data = gather(slab).tobytes()
     with suppress(OSError):  # a run without stored wisdom works too

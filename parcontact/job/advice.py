@@ -208,8 +208,8 @@ def more_points(grid: Grid) -> str:
 
 
 def fast_length(least: float) -> int:
-    """Return the smallest number of points, at least `least`, that makes Fourier transforms fast: MULTIPLE times a
-    number whose prime factors are 2, 3 and 5."""
+    """Return the smallest number of points for which Fourier transforms are fast, but at least `least`: `MULTIPLE`
+    times a number whose prime factors are 2, 3 and 5."""
     count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME_LENGTH)))
     while 60 ** count.bit_length() % count:  # 60 = 2 * 2 * 3 * 5
         count += 1
@@ -339,7 +339,8 @@ def doubt_measured_waves(
 ) -> Iterator[Doubt]:
     """Yield a warning if a measured surface, which slides along `directions`, has too few cells per shortest wave.
 
-    `wave` [m] is the length of this wave. The warning of a `spiky` surface says that outliers may have shortened it.
+    `wave` [m] is the length of the shortest wave. If the surface is `spiky`, the warning says that outliers may be the
+    reason for such a short wave.
     """
     spikes = ", which has outliers" if spiky else ""
     for numbers in _few_cells(wave, grid, asked, directions):
@@ -372,8 +373,8 @@ def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Ve
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
-    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 for `time_step: auto`, whose
-    steps need no warning."""
+    """Return the longest time step of a stage [s], before steps are fitted to the end of the stage. Return 0 for
+    `time_step: auto`, since chosen steps need no warning."""
     step = stage.time_step
     if step == AUTO:
         return 0.0
@@ -414,8 +415,8 @@ def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float |
 
 
 def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
-    """Return a sentence on how much the contact area, and friction if the surface `slides`, differ between seeds of the
-    surface; '' for a surface without a seed.
+    """Return a sentence on how much the contact area differs between seeds of the surface, and friction, too, if the
+    surface `slides`. Return '' for a surface without a seed.
 
     The scatter falls with the square root of the number of longest waves in the box.
     """

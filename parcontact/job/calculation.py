@@ -80,7 +80,7 @@ class Grid(Part):
 
     @property
     def cyclic(self) -> tuple[bool, bool]:
-        """Return whether the box is periodic along x and along y."""
+        """Return two values, for x and for y: True if the box is periodic along this axis."""
         return self.boundary != "free", self.boundary == "periodic"
 
     @property
@@ -134,9 +134,9 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """Return the relative error of friction that time steps may cause. The relative error of the area that steps
-        cause is at most a quarter of their error of friction, so that also the accuracy of the area limits the returned
-        value."""
+        """Return the relative error of friction that time steps may cause. Steps that cause this error of friction
+        cause an error of the area of at most a quarter of it. So the returned value is not larger than the accuracy of
+        friction, nor than four times the accuracy of the area."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 
@@ -176,7 +176,7 @@ class Numerics(Part):
 
     @property
     def chosen(self) -> dict[str, float]:
-        """Return the values that follow from `accuracy`, in a mapping by their keys."""
+        """Return the values that follow from `accuracy`, by their keys."""
         return self._chosen
 
     @property

@@ -3,8 +3,8 @@
 Given steps have a constant length or grow by a constant factor. They follow from the job and their number, so that a
 restart needs only the number of the last step. In stages with `time_step: auto` the run chooses the steps: the length
 of the next step is decided after a step has been made, between a shortest and a longest length (`march.controller`).
-Chosen steps are stored, so that steps have numbers and a run can restart. Future steps are estimated: they double from
-the shortest to the longest length and then stay constant.
+The ends of chosen steps are stored, so that a run can restart. Future steps are estimated: their length doubles from
+the shortest to the longest length and then stays constant.
 """
 
 import math
@@ -47,8 +47,8 @@ class Bounds:
 
 def most_cells(job: Sections) -> int:
     """Return the largest number of cells by which the surface may slide in a step. This is the largest power of two for
-    which the step is not longer than a quarter of the shortest wave. It is 1 if a quarter of this wave is shorter than
-    a cell, or if the waves are not known, for example because the heights come from a file."""
+    which the surface slides by at most a quarter of the shortest wave. It is 1 if a quarter of this wave is shorter
+    than a cell, or if the waves are not known, for example because the heights come from a file."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
     for shape in job.surface:
@@ -70,8 +70,8 @@ def longest_change(stage: Stage) -> float:
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """Return the limits on the steps of a stage. The longest step is at most the whole stage, and for a sliding surface
-    the time in which it slides by `cells` cells."""
+    """Return the limits on the steps of a stage. The longest step is at most the whole stage. If the surface slides, it
+    is also at most the time in which the surface slides by `cells` cells."""
     most = longest_change(stage)
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
@@ -83,7 +83,8 @@ def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
 
 @dataclass(frozen=True)
 class StepLadder:
-    """Steps whose length doubles from `first` to `most` [s] and then stays constant, until `seconds` have passed."""
+    """Steps whose length doubles from `first` to `most` [s] and then stays constant. The last step ends after `seconds`
+    [s]."""
 
     first: float
     most: float
@@ -219,7 +220,7 @@ class ChosenSteps:
 
 
 def describe_steps(job: Sections) -> str:
-    """Return a text that names the stages with chosen time steps, and what determines these steps; '' if there are
+    """Return a text that names the stages with chosen time steps, and what determines these steps, or '' if there are
     none."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
@@ -387,14 +388,15 @@ class Span:
         return self.start + self.ends.elapsed(index)
 
     def position(self, index: int) -> tuple[float, float]:
-        """Return the position of the surface [m] at the end of step `index`, counted as in `time`."""
+        """Return the position of the surface [m] at the end of step `index`, counted among the steps with a
+        duration."""
         slid = self.stage.moving(self.ends.elapsed(index))
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
     def place(self, number: int) -> int:
-        """Return the index of a step among those steps of the stage that have a duration, counted from 1; 0 for the
-        jump. `number` is the number of the step in the history."""
+        """Return the index of a step among those steps of the stage that have a duration, counted from 1. Return 0 for
+        the jump of the load. `number` is the number of the step in the history."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:

@@ -108,7 +108,7 @@ def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, outpu
 def study_fits(
     study: Study | None, grid: Grid, surface: tuple[Any, ...], history: tuple[Stage, ...]
 ) -> Iterator[Fault]:
-    """Yield an error unless a study has a history to compare, and whole numbers of points on all its meshes."""
+    """Yield an error if a study has no history to compare, or if one of its meshes has no whole number of points."""
     if study is None:
         return
     if not history:
@@ -226,8 +226,8 @@ def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Yield errors for arrays of heights without the shape of the grid, and for coordinates that are not spaced as its
-    cells."""
+    """Yield an error if an array of heights does not have the shape of the grid, or if its coordinates are not spaced
+    like the cells of the grid."""
     for index, shape in enumerate(surface):
         if not isinstance(shape, HeightArray):
             continue
@@ -249,7 +249,8 @@ def loads_are_borne(
     steady: Steady | None,
     bands: Any,
 ) -> Iterator[Fault]:
-    """Yield errors for mean pressures that reach the hardness, and for bands or steady sliding with a hardness."""
+    """Yield errors for mean pressures that reach the hardness of the material, and for bands or steady sliding of a
+    material with a hardness."""
     hardness = material.hardness
     if hardness is None:
         return
@@ -322,7 +323,7 @@ def first_step(stage: Stage, grid: Grid) -> float:
 
 
 def estimate_steps(stage: Stage, grid: Grid) -> float:
-    """Return the estimated number of steps of a stage; 0 if the stage has no duration."""
+    """Return the estimated number of steps of a stage, or 0 if the stage has no duration."""
     if not stage.seconds:
         return 0.0
     first = first_step(stage, grid)

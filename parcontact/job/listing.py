@@ -35,8 +35,8 @@ MOST_BRANCHES = 6  # largest number of branches that a table shows; of more it s
 
 
 def plain_data(value: Any) -> Any:
-    """Return a value of a job as plain data: numbers, texts, lists and mappings. Keys without a value, and keys that
-    `numerics.accuracy` chose, are left out."""
+    """Return a value of a job as plain data: numbers, texts, lists and mappings. Keys without a value are left out, and
+    keys whose values `numerics.accuracy` chose."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
@@ -81,7 +81,8 @@ def plain_job(job: Any) -> dict[str, Any]:
 
 
 def unit(kind: type[Part], key: str) -> str:
-    """Return the unit of a key, from the brackets in its description; '' if it has none."""
+    """Return the unit of a key, which stands in brackets in the description of the key. Return '' for a key without a
+    unit."""
     return unit_in(kind.model_fields[key].description).removeprefix("-")
 
 
@@ -123,8 +124,8 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
 
 
 def _unit_of(value: Any, part: Part, key: str) -> str:
-    """Return the unit of a number, with the velocity of a ramp or the frequency of an oscillation; '' for words such as
-    auto, and for mappings."""
+    """Return the unit of a number, with the velocity of a ramp or the frequency of an oscillation, or '' for words such
+    as auto, and for mappings."""
     if isinstance(value, Ramp) and value.velocity:
         return f"{unit(type(part), key)} at {text(value.velocity)} m/s"
     if isinstance(value, Oscillation | Swing):
@@ -191,8 +192,9 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 
 def answers(module: str, name: str, job: Any = None) -> list[Any]:
-    """Return all objects called `name` that effects have: effects of this package in their `module`, effects of other
-    packages in their class. If a `job` is given, only effects whose sections it has are asked."""
+    """Return all objects called `name` that effects have. Effects of this package have such objects in their `module`,
+    effects of other packages as attributes of their class. If a `job` is given, only effects whose sections it has are
+    asked."""
     others = [section for section in _registered() if not is_ours(section) and not why_unusable(section)]
     asked = [section for section in others if job is None or job.section(section) is not None]
     found = [(section, getattr(_load(section), name)) for section in asked if hasattr(_load(section), name)]
@@ -212,8 +214,8 @@ def _named(section: str, offered: Any) -> Any:
 
 @contextmanager
 def naming_effect(section: str) -> Iterator[None]:
-    """Return a context in which code of the effect of a `section` runs: if the code fails, or tries to end the program,
-    a RunError names the effect."""
+    """Return a context for code of the effect of a `section`. If the code fails, or tries to end the program, a
+    RunError that names the effect is raised."""
     try:
         yield
     except (InputError, RunError):
@@ -267,7 +269,7 @@ def _load(section: str) -> Any:
 
 @cache
 def why_unusable(section: str) -> str:
-    """Return the reason why the effect of a section cannot be used; '' if it can."""
+    """Return the reason why the effect of a section cannot be used, or '' if it can."""
     try:
         effect = _load(section)
         base = f"{Part.__module__}.{Part.__name__}"

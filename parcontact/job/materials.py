@@ -202,7 +202,8 @@ class FractionBranch(Part):
     tau: Positive = Field(description="a positive relaxation time [s]")
 
     def times(self, modulus: float) -> PronyBranch:
-        """Return the term with a modulus in Pa, for a body with the instantaneous modulus `modulus` [Pa]."""
+        """Return this term as a Prony branch with a modulus in Pa, for a body whose instantaneous modulus is `modulus`
+        [Pa]."""
         return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
 
 
@@ -313,9 +314,9 @@ class Zener(Part):
     """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8) of the paper.
 
     The body is a fluid if the long-term modulus is zero. Relaxation times and moduli of a material with a `shift` are
-    given at the reference temperature of the shift; at another `temperature` times are multiplied by the horizontal
-    factor a_T, and moduli by the vertical factor b_T. If the instantaneous modulus `modulus_0` is given, branches are
-    fractions of this modulus.
+    given at the reference temperature of the shift. At another temperature, which the key `temperature` gives,
+    relaxation times are multiplied by the horizontal factor a_T, and moduli by the vertical factor b_T. If the
+    instantaneous modulus `modulus_0` is given, branches are fractions of this modulus.
     """
 
     model: Literal["zener"] = "zener"
@@ -356,14 +357,15 @@ class Zener(Part):
 
     @property
     def time_factor(self) -> float:
-        """Return a_T [-], the ratio of relaxation times at the temperature to those at the reference temperature."""
+        """Return a_T [-]: relaxation times at the temperature of the body, divided by those at the reference
+        temperature."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** self.shift.made.log_factor(self.temperature))
 
     @property
     def modulus_factor(self) -> float:
-        """Return b_T [-], the ratio of moduli at the body's temperature to those at the reference temperature."""
+        """Return b_T [-]: moduli at the temperature of the body, divided by those at the reference temperature."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** log_vertical(self.shift.made, self.temperature))
@@ -384,7 +386,8 @@ class Zener(Part):
 
 
 class Dma(Part):
-    """A material fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
+    """A material that is fitted to a table of measured moduli when the job is read. The fit is that of `parcontact
+    fit`."""
 
     model: Literal["dma"] = "dma"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
@@ -424,7 +427,7 @@ class Dma(Part):
 
 
 def describe_temperature(material: Elastic | Zener | Dma, section: str = "material") -> str:
-    """Return a sentence on the temperature of the material in a section; '' for a material without a shift."""
+    """Return a sentence on the temperature of the material in a section, or '' for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener) or body.shift is None:
         return ""

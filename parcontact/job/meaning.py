@@ -56,8 +56,8 @@ WARN_STEEP = Kind(
 
 
 def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
-    """Yield a warning about an rms `slope` that is not small (above STEEP). The warning names keys that a surface from
-    files may need and does not have, such as a unit."""
+    """Yield a warning about an rms `slope` above `STEEP`, which is not small. The warning names keys, such as a unit,
+    that a surface from files may need and does not have."""
     if slope > STEEP:
         yield WARN_STEEP("surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
 
@@ -77,7 +77,7 @@ READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read f
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:
-    """Return True if the keys of the job give the rms slope of a surface, so that its heights need not be read."""
+    """Return True if the keys of the job determine the rms slope of a surface, so that its heights need not be read."""
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
@@ -130,12 +130,13 @@ def _temperatures(job: Sections) -> Iterator[Doubt]:
 
 
 def instant_contact_modulus(material: Elastic | Zener) -> float:
-    """Return the instantaneous contact modulus E* = 2 G/(1 - nu) [Pa], the largest at any time."""
+    """Return the instantaneous contact modulus E* = 2 G/(1 - nu) [Pa]. At all later times the contact modulus is
+    smaller or equal."""
     return 2.0 * material.instant_modulus / (1.0 - material.poisson)
 
 
 def _mean(stage: Stage, load: float, grid: Grid) -> float:
-    """Return the mean pressure of a stage with a load [Pa]; 0 for a stage with an approach."""
+    """Return the mean pressure of a stage with a load [Pa], or 0 for a stage with an approach."""
     if stage.control == "approach":
         return 0.0
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
@@ -441,7 +442,7 @@ def _imprints(job: Sections) -> Iterator[Doubt]:
 
 def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:
     """Return the distance [m] after which a slide of at most `most` seconds is within `near` [m] of a periodic image of
-    its start; inf if it never is."""
+    its start, or inf if it never is."""
     along = [abs(one) for one in velocity]
     main, other = (0, 1) if along[0] / grid.lx >= along[1] / grid.ly else (1, 0)
     for count in range(1, ROUNDS):
@@ -455,7 +456,7 @@ def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: fl
 
 def excited_band(job: Sections) -> tuple[float, float] | None:
     """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
-    stages and steady velocities; None if the surface does not move and no load oscillates."""
+    stages and steady velocities, or None if the surface does not move and no load oscillates."""
     velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
     speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
     turns = [stage.frequency for stage in job.history if stage.frequency]

@@ -3,7 +3,7 @@
 A map is read, cut to the box, treated (levelled, filled, made periodic), and resampled to the grid. Heights are arrays
 [m] of shape (ny, nx), with NaN at missing points.
 
-A measured spectrum is that of an isotropic surface: a table of C2D, the spectrum of the surface, or of C1D, the
+A measured spectrum describes an isotropic surface. It is a table of C2D, the spectrum of the surface, or of C1D, the
 one-sided spectrum of profiles, at wavenumbers q = 2 pi/wavelength. Its columns are `q[1/m] C2D[m^4]` or `q[1/m]
 C1D[m^3]`, or the same in mm, um or nm. As in `physics.roughness`, the mean square of the heights h is
 
@@ -48,11 +48,11 @@ class Treated:
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
-    """Return a map that is levelled, filled and made periodic; if `clip` is True, outliers are replaced by the median
+    """Return a map that is levelled, filled and made periodic. If `clip` is True, outliers are replaced by the median
     of their neighbours.
 
-    `detrend` is a key of TERMS. `periodic` is `smooth` (`make_periodic`), `mirror` (the map and its mirror images,
-    twice as long in both directions) or `none`.
+    `detrend`, a key of `TERMS`, chooses the trend that is removed. `periodic` is `smooth` (`make_periodic`), `mirror`
+    (the map and its mirror images, twice as long in both directions) or `none`.
     """
     known = np.isfinite(heights)
     filled = fill(remove_trend(heights, known, detrend), known)
@@ -91,10 +91,11 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return a mask of outliers, and the map of the medians of each point and its neighbours.
+    """Return a mask of outliers, and a map of medians: at each point, the median of the heights of this point and its
+    neighbours.
 
-    Outliers are points that differ from this median by more than OUTLIER times the median of such differences. For
-    points at the edges the map is continued with the same slope.
+    Outliers are points whose height differs from this median by more than `OUTLIER` times the median of all such
+    differences. At its edges the map is continued with the same slope.
     """
     around = scipy.ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
@@ -103,8 +104,8 @@ def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
 
 
 def is_periodic(heights: Array) -> bool:
-    """Return True if the rms jump across opposite edges of a map is at most the largest rms increment inside it, along
-    both directions."""
+    """Return True if, along both directions, the rms difference between opposite edges of a map is at most the largest
+    rms difference between neighbouring lines of points inside the map."""
     for rows in (heights, heights.T):
         jumps = np.sqrt(np.mean((np.roll(rows, -1, axis=0) - rows) ** 2, axis=1))
         if jumps[-1] > jumps[:-1].max(initial=0.0):
@@ -174,7 +175,7 @@ class Prepared:
 
 
 def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
-    """Return the measured map `found` on the grid of the job, after the treatment that the shape `part` asks for; root
+    """Return the measured map `found` on the grid of the job, after the treatment that the shape `part` asks for. Root
     only. Raises InputError for a map that is smaller than the box."""
     periodic = part.periodic or ("smooth" if any(grid.cyclic) else "none")
     copies = part.copies
@@ -272,8 +273,8 @@ def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, f
 def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """Return the spectrum of an isotropic surface from a line scan, and its longest and shortest wavelengths [m].
 
-    C1D of the levelled scan is computed with Hann's window, and averaged over parts of each decade of wavenumbers
-    (BINS). Raises InputError.
+    C1D of the levelled scan is computed with Hann's window, and averaged over `BINS` parts of each decade of
+    wavenumbers. Raises InputError.
     """
     heights, length = line.heights, line.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):

@@ -142,7 +142,7 @@ class Job(Part):
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Return all warnings about the job; they are errors with `numerics.strict`."""
+        """Return all warnings about the job. With `numerics.strict` they count as errors."""
         given = self.material.given
         of_fit = given.doubts if isinstance(given, Dma) else ()
         tests = meaning.ON_A_GRID if self.bands is None else meaning.IN_BANDS
@@ -171,7 +171,7 @@ class Job(Part):
 
     @property
     def measured(self) -> bool:
-        """Return True if the material states the range of frequencies or of temperatures in which it was measured."""
+        """Return True if the material states in which range of frequencies or of temperatures it was measured."""
         body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
@@ -184,7 +184,7 @@ class Job(Part):
         return compared or not meaning.says_all(self.surface)
 
     def at_temperature(self, temperature: float) -> Job:
-        """Return the job with its material at another temperature [deg C]; raises InputError without a shift."""
+        """Return the job with its material at another temperature [deg C]. Raises InputError without a shift."""
         return self.model_copy(update={"material": heated(self.material, temperature)})
 
     def left_out(self) -> tuple[str, ...]:

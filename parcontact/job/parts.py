@@ -121,8 +121,8 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return this part as it was in the job. An effect may have replaced it, as a counterbody replaces the
-        material."""
+        """Return this part as it was in the job. An effect may have replaced it, for example the material by two bodies
+        as one."""
         return self
 
     def left_out(self) -> tuple[str, ...]:
@@ -248,7 +248,7 @@ def _value(
 
 
 def kind_key(part: type[Part]) -> str:
-    """Return the key that selects the kind of a part (shape, model, law), or ''."""
+    """Return the key that selects the kind of a part (shape, model, law), or '' for a part without kinds."""
     kinds = (word for word in ("shape", "model", "law") if word in part.model_fields)
     return next((word for word in kinds if len(get_args(part.model_fields[word].annotation)) == 1), "")
 
@@ -328,7 +328,7 @@ def along_x(value: Any) -> Any:
 
 
 def listed(value: Any) -> Any:
-    """Return a list; a single value is a list of one."""
+    """Return a list. A single value becomes a list with one item."""
     return value if isinstance(value, list | tuple) else (value,)
 
 
@@ -350,7 +350,8 @@ def from_home(path: Path) -> Path:
 
 
 def unit_in(description: str | None) -> str:
-    """Return the unit in the brackets of a key's description, `-` if it has no dimension, '' without brackets."""
+    """Return the unit in the brackets of a key's description: `-` for a quantity without dimension, and '' without
+    brackets."""
     found = re.search(r"\[([^\],]+)\]", description or "")
     return found[1] if found else ""
 
@@ -366,7 +367,7 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 def log_range(text: str) -> tuple[float, ...]:
     """Return n positive numbers from a to b, equally spaced in the logarithm, from a text `a:b:n`.
 
-    Raises ValueError for another text; its message is the end of a sentence "KEY must be ...".
+    Raises ValueError for another text. The message of the error is the end of a sentence "KEY must be ...".
     """
     try:
         first, last, count = text.split(":")

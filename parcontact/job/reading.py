@@ -75,7 +75,7 @@ class Sweep:
     place: Place
 
     def __len__(self) -> int:
-        """Return the number of cases; 0 if the job has no sweep."""
+        """Return the number of cases, or 0 if the job has no sweep."""
         return math.prod(map(len, self.axes)) if self.axes else 0
 
     def case(self, index: int) -> tuple[Setting, ...]:
@@ -199,7 +199,7 @@ def read_job(
 
 
 def _parse(change: Change, source: Source) -> Setting | None:
-    """Return a change as a setting; None if it has mistakes, which are added to `source`."""
+    """Return a change as a setting, or None if it has mistakes, which are added to `source`."""
     if isinstance(change, str):
         place = Place(f"--set {shorten(change)}")
         name, equals, value = change.partition("=")
@@ -373,8 +373,8 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
 
 
 def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid | None = None) -> tuple[Case, ...]:
-    """Return all cases of a job, read as by `load`; a job without a sweep is one case. A mistake that only some cases
-    have names the first of them."""
+    """Return all cases of a job, read as by `load`. A job without a sweep is one case. If only some cases have a
+    mistake, its message names the first of these cases."""
     first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if not sweep:
         if first is None:
@@ -389,7 +389,7 @@ def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid | N
 
 
 def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
-    """Return all cases if `number` is None, else only the case with this number; raises InputError if it does not
+    """Return all cases if `number` is None, else only the case with this number. Raises InputError if it does not
     exist."""
     if number is None:
         return cases

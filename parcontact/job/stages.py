@@ -182,7 +182,7 @@ class Ramp:
 
     @property
     def seconds(self) -> float:
-        """Return the duration [s] of a ramp with a given normal velocity; 0 without a velocity."""
+        """Return the duration [s] of a ramp with a given normal velocity, or 0 without a velocity."""
         return abs(self.end - self.start) / self.velocity if self.velocity else 0.0
 
     @property
@@ -359,7 +359,7 @@ class Stage(Part):
 
     @property
     def frequency(self) -> float:
-        """Return the frequency of the load or of the velocity [Hz]; 0 for a stage that does not oscillate."""
+        """Return the frequency of the load or of the velocity [Hz], or 0 for a stage that does not oscillate."""
         found = (each for each in (self.load, self.velocity) if isinstance(each, Oscillation | Swing))
         return next((each.frequency for each in found), 0.0)
 
@@ -385,7 +385,7 @@ class Stage(Part):
 
     @property
     def seconds(self) -> float:
-        """Return the duration of the stage [s]; 0 for a stage that is one step without duration."""
+        """Return the duration of the stage [s], or 0 for a stage that is one step without duration."""
         if self.distance is not None:
             return self.distance / self.speed
         if self.cycles is not None:

@@ -29,8 +29,8 @@ class GivenHeights:
     """A read-only map of heights [m], shape (ny, nx), from Python. Only root has `values`: a job that is sent to other
     ranks loses them.
 
-    `cell` is the spacing [m] of the points along x and y, from the coordinates of an xarray; NaN for an array without
-    coordinates.
+    `cell` is the spacing [m] of the points along x and y, from the coordinates of an xarray, or NaN for an array
+    without coordinates.
     """
 
     def __init__(self, given: Any) -> None:
@@ -205,7 +205,7 @@ class RoughSpectrum(Part):
 
 
 class Sphere(Part):
-    """A sphere. With `profile: paraboloid` it has the shape of the parabola that touches its tip, as in Hertz's
+    """A sphere. With `profile: paraboloid` its shape is the parabola that touches the tip of the sphere, as in Hertz's
     theory."""
 
     shape: Literal["sphere"] = "sphere"
@@ -324,7 +324,7 @@ class Topography(Part):
 
     def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
         """Return the size [m] along x and y that the job gives for a map: the key `size`, or `pixel` times the numbers
-        of `points` of the map; None without both."""
+        of `points` of the map. Return None if the job has neither key."""
         return (self.pixel[0] * points[0], self.pixel[1] * points[1]) if self.pixel else self.size
 
 
@@ -366,8 +366,8 @@ Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnySha
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumber [rad/m] of a wave, or the lowest and the highest wavenumber of another shape; () for a flat
-    surface. Round shapes and files may have every wave from the length of the box to that of two cells."""
+    """Return the wavenumber [rad/m] of a wave, or the lowest and the highest wavenumber of another shape. Return () for
+    a flat surface. Round shapes and files may have every wave from the length of the box to that of two cells."""
     longest = 2.0 * math.pi / max(grid.size)
     cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
     if isinstance(shape, Flat):

@@ -170,7 +170,7 @@ def list_words(words: Iterable[str]) -> str:
 
 
 def closest(word: Any, words: Iterable[str]) -> str:
-    """Return the word of `words` that is closest to a misspelt `word`, '' if none is close."""
+    """Return the word of `words` that is closest to a misspelt `word`, or '' if no word is close."""
     if len(str(word)) > MAX_WORD:
         return ""
     known = {candidate.lower(): candidate for candidate in words}
@@ -223,7 +223,7 @@ def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
 
 
 class JobLoader(yaml.SafeLoader):
-    """PyYAML's safe loader, with the rules RESOLVERS on which words without quotes are numbers, true or nothing."""
+    """PyYAML's safe loader. `RESOLVERS` are its rules for words without quotes: which are numbers, true or nothing."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
