@@ -238,6 +238,10 @@ class Sheared:
     time: float = 0.0
     mesh: float = 0.0
 
+    def error_of_tractions(self, of_area: float) -> float:
+        """Return the relative error of the tractions, for the relative error `of_area` of the contact area."""
+        return self.error + self.share * of_area + self.time + self.mesh
+
 
 @dataclass(frozen=True)
 class Instant:

@@ -94,7 +94,7 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
         return
     t, p = _along(traction), _along(pressure)
     instant = run.instant(*fields.when(fields.chosen))
-    bound, touched = run.job.section("interface").coefficient, place[p > 0.0]
+    bound, touched = run.job.section("interface").coefficient, place[(p > 0.0) | (t != 0.0)]
     lines = [Line("traction", place, t, {"color": style.BLUE})]
     for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
         lines.append(Line(name, place, sign * bound * p, BLACK | {"linestyle": ":"}))
@@ -232,13 +232,13 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
 
 
 def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
-    """Return a map of |traction| where there is pressure, and a map of its ratio to the bound, which is 1 where points
-    slip.
+    """Return a map of |traction| where there is pressure or traction, and a map of its ratio to the bound, which is 1
+    where points slip.
 
     With a coefficient of friction the bound is this coefficient times the pressure. With a shear strength it is the
     largest traction in the map.
     """
-    touching, coefficient = pressure > 0.0, job.section("interface").coefficient
+    touching, coefficient = (pressure > 0.0) | (traction > 0.0), job.section("interface").coefficient
     bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
     share = np.divide(traction, bound, out=np.zeros_like(traction), where=bound > 0.0)
     return np.where(touching, traction, np.nan), np.where(touching, share, np.nan)

@@ -4,6 +4,7 @@ adhesion."""
 from ...capabilities import Axis, Column, ColumnPanel, Table
 
 SECTION, EFFECT = "adhesion", "AdhesionColumns"
+USES = ("shear",)  # see `capabilities`
 CHANGES_STEPS = ("adhesion.work", "adhesion.range", "adhesion.law")  # see `capabilities`
 
 

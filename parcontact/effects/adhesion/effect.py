@@ -25,10 +25,10 @@ R rho/h^2)`, by Poisson's sum of a Gaussian.
 The energies of a run are the work of the load, the energy of the attraction, and the energy lost in snaps.
 
 In a step the rigid surface does the work `F dd - F_t ds` along the path of its load, with the normal force F, the
-change dd of the approach, the tangential force F_t and the distance ds that it slides; the integral is taken by the
-trapezoidal rule. The gain is the increase of the energies of the body and of the attraction, plus the energy that the
-body dissipates. If the work exceeds the gain by more than the error of the rule, the difference is lost in a snap.
-Otherwise the difference counts as an error, and the work is set to the gain.
+change dd of the approach, the tangential force F_t of the pressures and the distance ds that it slides; the integral is
+taken by the trapezoidal rule. The gain is the increase of the energies of the body and of the attraction, plus the
+energy that the body dissipates. If the work exceeds the gain by more than the error of the rule, the difference is lost
+in a snap. Otherwise the difference counts as an error, and the work is set to the gain.
 
 Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
 load in these states depends on inertia, which the model does not have. So the work in such a step is the work up to the
@@ -45,6 +45,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
+import numpy as np
+
 from ...columns import added_by
 from ...contact.problem import Mask
 from ...errors import Doubt, Kind
@@ -58,6 +60,7 @@ from ...march.budget import ENERGY
 from ...parallel.slab import Array
 from ...physics.body import remembers
 from ...physics.records import Entry, Measures, Saved, Units
+from ...physics.surface import Vector
 from ..effect import (
     BY_THEORY,
     EXTRAPOLATION,
@@ -274,6 +277,8 @@ LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the ste
 FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
 SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
 
+Forces = tuple[Vector, Vector]  # before and after a step
+
 
 def _excluded(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
     if adhesion is None:
@@ -320,7 +325,8 @@ class AdhesiveEnergies(NamedTuple):
 
     `work` is the work that the rigid surface has done. `surfaces` is the energy of the attraction, 0 at large gaps and
     negative at small gaps. `lost` is the energy lost in snaps. `error` is the error of these energies: the differences
-    between work and energies in all steps without a snap, and the error of the dissipated energy by the mesh.
+    between work and energies in all steps without a snap, the error of the dissipated energy by the mesh, and the error
+    of the energy lost in slip.
     """
 
     work: float = 0.0
@@ -332,13 +338,14 @@ class AdhesiveEnergies(NamedTuple):
 NO_ENERGIES = AdhesiveEnergies()
 
 
-def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
-    """Return the energies after the step that `instant` describes. `past` are the energies before it, and `area` [m^2]
-    is the area of the box."""
+def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float, forces: Forces) -> AdhesiveEnergies:
+    """Return the energies after the step that `instant` describes. `past` are the energies before it, `area` [m^2] is
+    the area of the box, and `forces` [N] are the tangential forces of the pressures on the surface before and after the
+    step."""
     numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
     surfaces = numbers["surface_energy"]
     gained = instant.gained + surfaces - past.surfaces
-    dragged, doubt = _drag(before, measures, instant.moved)
+    dragged, doubt = _drag(forces, instant.moved)
     work = numbers["work_of_load"] + dragged
     if numbers["leaves_equilibrium"]:
         work = max(work, gained)
@@ -348,28 +355,38 @@ def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> A
     lost = work - gained
     snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
     error = past.error + ENERGY.value * instant.error_area * abs(instant.dissipated)
+    if instant.sheared is not None:
+        error += instant.sheared.lost * min(instant.sheared.error_of_tractions(instant.error_area), 1.0)
     if snaps:
         return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, error)
     return AdhesiveEnergies(past.work + gained, surfaces, past.lost, error + abs(lost))
 
 
-def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
-    """Return the work of sliding by `moved` without friction of the interface, and its error [J]."""
-    (x, y), slid = moved, math.hypot(*moved)
-    if not slid:
+def _drag(forces: Forces, moved: Vector) -> tuple[float, float]:
+    """Return the work of sliding by `moved` against the tangential forces before and after a step, and its error
+    [J]."""
+    if not any(moved):
         return 0.0, 0.0
-    works = [-(one.force_x * x + one.force_y * y) - one.force_interface * slid for one in (before, now)]
-    return 0.5 * sum(works), 0.5 * abs(works[1] - works[0]) + FORCE_DOUBT * abs(works[1])
+    old, new = (-(x * moved[0] + y * moved[1]) for x, y in forces)
+    return 0.5 * (old + new), 0.5 * abs(new - old) + FORCE_DOUBT * abs(new)
+
+
+def force_of_pressures(measures: Measures, velocity: Vector) -> Vector:
+    """Return the tangential force of the pressures on the surface [N], which is that of a step without the force of an
+    interface that slips everywhere, against the velocity."""
+    size = measures.force_interface / (math.hypot(*velocity) or 1.0)
+    return measures.force_x + size * velocity[0], measures.force_y + size * velocity[1]
 
 
 @dataclass(frozen=True)
 class AdhesionMemory:
-    """Memory of the effect: the energies, the number `snaps` of steps in which the contact has snapped, and the values
-    of the `columns` in the last row. `front_warning_given` is True after the warning about edges of contact that move
-    too far in a step."""
+    """Memory of the effect: the energies, the number `snaps` of steps in which the contact has snapped, the
+    tangential `force` of the pressures [N], and the values of the `columns` in the last row. `front_warning_given`
+    is True after the warning about edges of contact that move too far in a step."""
 
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
+    force: Vector = (0.0, 0.0)
     front_warning_given: bool = False
     columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
 
@@ -480,10 +497,11 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         warns once if edges of contact of a viscoelastic body move so far in a step that the rates of strain are not
         resolved."""
         solved, energies = instant.solved, memory.energies
+        force = force_of_pressures(instant.measures, instant.step.velocity)
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
-                energies = advance_energies(energies, instant, self._area)
+                energies = advance_energies(energies, instant, self._area, (memory.force, force))
             columns = (*columns[:2], energies.surfaces, energies.lost)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.decide is not None
@@ -491,7 +509,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         snapped |= energies.lost > memory.energies.lost and not instant.untouched
         warns = far and not (chosen or memory.front_warning_given or instant.step.jump)
         warns = warns and remembers(self._scene.material)
-        memory = AdhesionMemory(energies, memory.snaps + snapped, memory.front_warning_given or warns, columns)
+        memory = AdhesionMemory(energies, memory.snaps + snapped, force, memory.front_warning_given or warns, columns)
         remark = (
             f"the edge of contact moves by {0.5 * instant.front:.2g} times a process zone, and rates are resolved up "
             "to half of one: use shorter steps, or time_step: auto; further steps are not checked"
@@ -512,10 +530,12 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return memory.energies.error
 
     def entries(self, memory: AdhesionMemory, units: Units) -> dict[str, Entry]:
-        """Return the checkpoint entries: the energies, and the number of steps in which the contact snapped."""
+        """Return the checkpoint entries: the energies, the number of steps in which the contact snapped, and the
+        force."""
         energies = {name: Entry(value, 1.0, "J") for name, value in memory.energies._asdict().items()}
-        return energies | {"snaps": Entry(float(memory.snaps))}
+        return energies | {"snaps": Entry(float(memory.snaps)), "force": Entry(np.array(memory.force), 1.0, "N")}
 
     def restored(self, memory: AdhesionMemory, saved: Saved) -> AdhesionMemory:
         energies = AdhesiveEnergies(*(float(saved[name]) for name in AdhesiveEnergies._fields))
-        return AdhesionMemory(energies, int(saved["snaps"]))
+        x, y = saved["force"].tolist()
+        return AdhesionMemory(energies, int(saved["snaps"]), (x, y))

@@ -84,8 +84,9 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
 
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
-    if interface is not None and interface.stick and adhesion is not None:
-        yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
+    if None not in (interface, adhesion) and interface.coefficient is not None:
+        sentence = "cannot be used with adhesion: pressures at the edge of contact are negative; give a shear_stress"
+        yield Fault(sentence, ("interface", "coefficient"))
 
 
 OF_TRACTIONS = [check for name, check in limits.no_field.items() if name == "traction"]  # none without `effects.stick`

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from parcontact.effects.adhesion.effect import FORCE_DOUBT, AdhesiveEnergies, advance_energies, law_of
-from parcontact.effects.effect import SolvedContact
+from parcontact.effects.effect import Sheared, SolvedContact
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.job.reading import sentences_of
@@ -247,6 +247,7 @@ def test_approaches_beyond_full_contact_are_refused_before_the_first_step() -> N
 
 AREA = 2.0  # of the box [m^2]
 STEP = 0.25 * ENERGY.value * 4.0  # error of the dissipation, 4 J
+SHEARED = Sheared(Measures(), (0.0, 0.0), 10.0, np.zeros(0), 0.125, 0.5, 0.0625, 0.0625)  # 10 J lost, to 37.5 %
 
 
 @pytest.mark.parametrize(
@@ -281,15 +282,20 @@ def test_energies_of_a_step(
     numbers = {"surface_energy": 1.0, "work_of_load": pushed, "leaves_equilibrium": float(jumps)}
     instant: Any = SimpleNamespace(
         solved=SimpleNamespace(numbers=numbers),
-        before=Measures(pressure=1.0, force_x=force[0]),
-        measures=Measures(pressure=7.0, force_x=force[1], approach=approach),
+        before=Measures(pressure=1.0),
+        measures=Measures(pressure=7.0, approach=approach),
+        sheared=None,
         gained=3.0,
         error_area=0.25,
         dissipated=-4.0,
         moved=(2.0, 0.0),
     )
-    found = advance_energies(AdhesiveEnergies(1.0, 2.0, 0.5, 0.1), instant, AREA)
+    forces = (force[0], 5.0), (force[1], 5.0)  # those along y do no work
+    found = advance_energies(AdhesiveEnergies(1.0, 2.0, 0.5, 0.1), instant, AREA, forces)
     assert found == pytest.approx(expected, rel=1e-12)
+    instant.sheared = SHEARED
+    found = advance_energies(AdhesiveEnergies(1.0, 2.0, 0.5, 0.1), instant, AREA, forces)
+    assert found.error == pytest.approx(expected[3] + 10.0 * 0.375, rel=1e-12)
 
 
 def test_a_contact_of_which_all_may_be_an_error_is_not_loaded() -> None:
