@@ -94,7 +94,8 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
         return
     t, p = _along(traction), _along(pressure)
     instant = run.instant(*fields.when(fields.chosen))
-    bound, touched = run.job.section("interface").coefficient, place[(p > 0.0) | (t != 0.0)]
+    bound = run.job.section("interface").coefficient
+    touched = place[_under_traction(t, p, bound)]
     lines = [Line("traction", place, t, {"color": style.BLUE})]
     for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
         lines.append(Line(name, place, sign * bound * p, BLACK | {"linestyle": ":"}))
@@ -232,16 +233,23 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
 
 
 def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
-    """Return a map of |traction| where there is pressure or traction, and a map of its ratio to the bound, which is 1
-    where points slip.
+    """Return a map of |traction| where surfaces touch, and a map of its ratio to the bound, which is 1 where points
+    slip.
 
     With a coefficient of friction the bound is this coefficient times the pressure. With a shear strength it is the
     largest traction in the map.
     """
-    touching, coefficient = (pressure > 0.0) | (traction > 0.0), job.section("interface").coefficient
+    coefficient = job.section("interface").coefficient
+    touching = _under_traction(traction, pressure, coefficient)
     bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
     share = np.divide(traction, bound, out=np.zeros_like(traction), where=bound > 0.0)
     return np.where(touching, traction, np.nan), np.where(touching, share, np.nan)
+
+
+def _under_traction(traction: Array, pressure: Array, coefficient: float | None) -> Array:
+    """Return the map of points that touch. A shear strength acts at all of them, also where they pull; adhesion leaves
+    small positive pressures elsewhere, by the errors of solves."""
+    return pressure > 0.0 if coefficient is not None or not traction.any() else traction != 0.0
 
 
 def _find_window(pressure: Array | None) -> Window:

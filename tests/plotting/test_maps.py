@@ -140,6 +140,24 @@ def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
     assert np.isnan(maps.mask("gap", gap, np.abs(pressure), job)).all()
 
 
+def test_tractions_are_drawn_where_surfaces_touch() -> None:
+    """A strength acts where they pull, too, and not at a rest of pressure; with a coefficient, and before the first
+    motion, surfaces touch where there is pressure."""
+    stick = {"interface": {"shear_stress": 2.0, "stick": True}}
+    given = {"grid": {"points": 8, "size": 1e-3}, "surface": {"shape": "flat"}, "history": [{"pressure": 1e3}]}
+    given["material"] = {"model": "elastic", "shear_modulus": 1e6}
+    strength = Job.model_validate(given | stick)
+    coefficient = Job.model_validate(given | {"interface": {"coefficient": 0.5, "stick": True}})
+    pressure, traction = np.array([[3.0, -2.0, 1e-6, -1e-9]]), np.array([[2.0, 1.0, 0.0, 0.0]])
+    for job, t, closed in (
+        (strength, traction, [True, True, False, False]),
+        (strength, 0.0 * traction, [True, False, True, False]),
+        (coefficient, traction, [True, False, True, False]),
+    ):
+        assert [(~np.isnan(one)).tolist() for one in maps.stick_maps(t, pressure, job)] == [[closed], [closed]]
+    assert maps.stick_maps(traction, pressure, strength)[1][0, :2].tolist() == [1.0, 0.5]
+
+
 def test_tractions_of_a_strip_are_a_line_within_their_bounds(tmp_path: Path, drawn: list[Figure]) -> None:
     """A wave begins to slide: some points are at the bound, some below."""
     slide = "{pressure: 1.0e3, velocity: 0.1, distance: 1.2e-7, cells_per_step: 0.001}"
