@@ -295,7 +295,7 @@ SomeBands = Annotated[Bands | Auto, PlainValidator(_choose, json_schema_input_ty
 
 def _no_study(bands: Any, study: Any) -> Iterator[Fault]:
     if bands is not None and study:
-        yield Fault("cannot be used with bands: a study refines one grid", ("study",))
+        yield Fault("cannot be used with bands: a study refines one grid; compare bands.points by a sweep", ("study",))
 
 
 def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[Fault]:
@@ -324,7 +324,9 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
     if initial.state == "steady" and (initial.velocity[1] or not initial.velocity[0]):
         yield Fault("must be along x, and not zero, in a job in bands", ("initial", "velocity"))
     if output.energy:
-        yield Fault("cannot be used with bands: the work on finer bands is in no band", ("output", "energy"))
+        yield Fault(
+            "cannot be used with bands: the work on finer bands is in no band; leave it out", ("output", "energy")
+        )
 
 
 BAND_RULES = rules_of(_over_time, _no_study)

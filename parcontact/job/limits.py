@@ -38,7 +38,10 @@ def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
     """Yield an error if the box is periodic along one axis and free along the other. `what` names the part of the job
     that is not computed in such a box, such as steady sliding."""
     if any(grid.cyclic) and not all(grid.cyclic):
-        yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
+        yield Fault(
+            f"must be periodic or free with {what}, got [periodic, free], a box for which it is not solved",
+            ("grid", "boundary"),
+        )
 
 
 def steady_sections(initial: Initial, steady: Steady | None) -> list[str]:
@@ -255,10 +258,14 @@ def loads_are_borne(
     if hardness is None:
         return
     if bands is not None:
-        yield Fault("cannot be used with bands: their closing has no largest pressure", ("material", "hardness"))
+        sentence = (
+            "cannot be used with bands: finer bands have no largest pressure; leave it out, or give the job a grid"
+        )
+        yield Fault(sentence, ("material", "hardness"))
         return
     for key in steady_sections(initial, steady):
-        yield Fault("cannot be used with material.hardness: slide into the steady state with a stage", (key,))
+        sentence = "cannot be used with material.hardness: steady sliding is solved without a largest pressure"
+        yield Fault(f"{sentence}; slide into the steady state with a stage", (key,))
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
@@ -274,8 +281,8 @@ def refuse_steady(section: str) -> Rule:
 
     def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
         for key in steady_sections(initial, steady) if given is not None else ():
-            sentence = f"cannot be used with {section}: slide into the steady state with a stage of the history"
-            yield Fault(sentence, (key,))
+            sentence = f"cannot be used with {section}: steady sliding is solved without its contact law"
+            yield Fault(f"{sentence}; slide into the steady state with a stage of the history", (key,))
 
     return Rule((section, "initial", "steady"), check)
 

@@ -43,9 +43,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
-from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
-
 import numpy as np
+from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ...columns import added_by
 from ...contact.problem import Mask
@@ -284,11 +283,13 @@ def _excluded(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -
     if adhesion is None:
         return
     if material.hardness is not None:
-        yield Fault("cannot be used with adhesion: leave one of them out", ("material", "hardness"))
+        sentence = "cannot be used with adhesion: contacts that attract and yield are not solved; leave one of them out"
+        yield Fault(sentence, ("material", "hardness"))
     if adhesion.range == AUTO and material.fitted.long_modulus == 0.0:
         yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
     if bands is not None:
-        yield Fault("cannot be used with bands: they are coupled by pressures alone", ("adhesion",))
+        sentence = "cannot be used with bands: they are coupled by pressures alone; give the job a grid"
+        yield Fault(sentence, ("adhesion",))
     yield from limits.no_strip("adhesion", grid)
 
 

@@ -42,21 +42,24 @@ def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
 
 def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
     if thermal is not None and thermal.feedback != "none" and initial.state == "steady":
-        yield Fault("cannot be used with thermal.feedback: slide into the steady state with a stage", ("initial",))
+        sentence = "cannot be used with thermal.feedback: the steady state would be that of cold rubber"
+        yield Fault(f"{sentence}; slide into the steady state with a stage", ("initial",))
 
 
 def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
     if thermal is None or thermal.counterbody is None:
         return
     if bands is not None:
-        yield Fault("cannot be used with bands: all heat goes into the rubber", ("thermal", "counterbody"))
+        sentence = "cannot be used with bands, whose heat all goes into the rubber; leave it out"
+        yield Fault(sentence, ("thermal", "counterbody"))
     if history:
         yield Fault(
             "is for friction curves: leave out the history, or the counterbody, and all heat goes into the rubber",
             ("thermal", "counterbody"),
         )
     if grid.boundary == "free":
-        yield Fault("needs grid.boundary: periodic", ("thermal", "counterbody"))
+        sentence = "needs grid.boundary: periodic: the share of heat is solved for in a box that repeats"
+        yield Fault(sentence, ("thermal", "counterbody"))
 
 
 def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:

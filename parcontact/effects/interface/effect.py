@@ -60,13 +60,17 @@ def _sticks(
         yield from (fault for check in OF_TRACTIONS for fault in check(output))
         return
     if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
-        yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", ("interface", "stick"))
+        sentence = (
+            "needs grid.boundary: periodic or free, got [periodic, free], a box for which tractions are not solved"
+        )
+        yield Fault(sentence, ("interface", "stick"))
     for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if asked:
-            yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
+            sentence = "cannot be used with interface.stick: steady sliding is solved without tractions that stick"
+            yield Fault(f"{sentence}; slide into the steady state with a stage", (key,))
     if bands is not None and history:
         sentence = "cannot be used with bands and a history: tractions of all bands would have to be solved together"
-        yield Fault(sentence, ("interface", "stick"))
+        yield Fault(f"{sentence}; give the job a grid", ("interface", "stick"))
 
 
 def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
@@ -85,7 +89,10 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if None not in (interface, adhesion) and interface.coefficient is not None:
-        sentence = "cannot be used with adhesion: pressures at the edge of contact are negative; give a shear_stress"
+        sentence = (
+            "cannot be used with adhesion: pressures at the edge of contact are negative, and without the attraction, "
+            "up to work/range, they depend on the range; give a shear_stress"
+        )
         yield Fault(sentence, ("interface", "coefficient"))
 
 

@@ -339,6 +339,9 @@ THINNEST = 1e-9  # rounding: least thickness of a layer over the longer side of 
 THICKEST = 1 / 3  # physics: limit of small strains for the indentation over the thickness of a layer
 FEWEST_CELLS = 2.0  # accuracy: least cells in a thickness, the length over which pressure falls at the edge of contact
 LONGEST = 100.0  # physics: wavelength over thickness above which the compressibility of rubber matters
+SMALL_CONTACT = (  # physics: errors of a half space, in `tests/effects/layer/test_response.py`
+    "if contacts have radii below a tenth of the thickness (up to 13 % too soft under pressure, 5 % under shear)"
+)
 NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a body counts as incompressible
 
 
@@ -389,13 +392,14 @@ def _no_counterbody(body: Any, counterbody: Any) -> Iterator[Fault]:
 
 def _no_stick(body: Any, interface: Any) -> Iterator[Fault]:
     if None not in (body, interface) and interface.stick:
-        sentence = "needs a half space: pressure on a layer moves its surface sideways; leave out body"
-        yield Fault(sentence, ("interface", "stick"))
+        sentence = "needs a half space: pressure on a layer moves its surface sideways, which is not solved for"
+        yield Fault(f"{sentence}; leave out stick, or body {SMALL_CONTACT}", ("interface", "stick"))
 
 
 def _no_softening(body: Any, softening: Any) -> Iterator[Fault]:
     if None not in (body, softening):
-        yield Fault("cannot be used with softening: strains are those of a half space", ("body",))
+        sentence = "cannot be used with softening: strains are those of a half space; leave one of them out"
+        yield Fault(sentence, ("body",))
 
 
 RULES = rules_of(_is_thick_enough, _has_a_kernel, _no_bands, _no_counterbody, _no_stick, _no_softening)

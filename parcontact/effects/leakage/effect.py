@@ -191,16 +191,18 @@ def _refused(leakage: Leakage | None, material: Any, numerics: Any) -> Iterator[
     if leakage is None or not leakage.total:
         return
     if material.hardness is not None:
-        yield Fault("cannot be used with leakage.load: total: leave one of them out", ("material", "hardness"))
+        sentence = "cannot be used with leakage.load: total: a fluid between surfaces that yield is not solved for"
+        yield Fault(f"{sentence}; leave one of them out", ("material", "hardness"))
     if numerics.precision == "mixed":
         yield Fault("must be double with leakage.load: total: gaps are small", ("numerics", "precision"))
 
 
-def _excludes(section: str) -> Rule:
+def _excludes(section: str, why: str) -> Rule:
     def check(leakage: Leakage | None, other: Any) -> Iterator[Fault]:
         sticks = section != "interface" or getattr(other, "stick", False)
         if leakage is not None and leakage.total and other is not None and sticks:
-            yield Fault(f"cannot be used with {section}{'.stick' * (section == 'interface')}", ("leakage", "load"))
+            sentence = f"cannot be used with {section}{'.stick' * (section == 'interface')}: {why} is not solved for"
+            yield Fault(f"{sentence}; leave one of them out, or give load: net", ("leakage", "load"))
 
     return Rule(("leakage", section), check)
 
@@ -235,7 +237,9 @@ class LeakageColumns(Effect[tuple[float, ...]]):
     stage: ClassVar[type[Stage]] = SealStage
     rules: ClassVar[tuple[Rule, ...]] = (
         *rules_of(_needs_steps, _stages, _no_free_box, _has_map, _refused, _no_steady),
-        *map(_excludes, ("adhesion", "interface", "thermal")),
+        _excludes("adhesion", "a fluid between surfaces that attract each other"),
+        _excludes("interface", "a fluid that carries load in a contact that sticks"),
+        _excludes("thermal", "the heat that a fluid carries away"),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["fluid_pressure"],)
 

@@ -247,7 +247,7 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
         )
         yield Fault(f"{sentence} Prony series; leave out the history and give steady.pressures", ("history",))
     if initial.state == "steady":
-        yield Fault("cannot be used with softening, as softened moduli are no Prony series", ("initial",))
+        yield Fault("cannot be used with softening, as softened moduli are no Prony series; leave it out", ("initial",))
 
 
 def in_a_periodic_box(softening: Softening | None, grid: Any) -> Iterator[Fault]:

@@ -146,8 +146,8 @@ def test_it_costs_nothing() -> None:
         ("interface: {coefficient: 0.5, stick: true}", "interface.stick needs material.poisson of 0.5, got 0.3"),
         ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
         (
-            "interface: {shear_stress: 1.0e5, stick: true}\nadhesion: {work: 0.05, range: 1.0e-6}",
-            "interface.stick cannot be used with adhesion",
+            "interface: {coefficient: 0.5, stick: true}\nadhesion: {work: 0.05, range: 1.0e-6}",
+            "interface.coefficient cannot be used with adhesion: pressures at the edge of contact are negative",
         ),
     ],
 )

@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from parcontact.contact.preconditioner import ExtendedPreconditioner
-from parcontact.effects.layer.effect import DECAY, Base, Layer, LongWavePreconditioner, LongWaves
+from parcontact.effects.layer.effect import DECAY, SMALL_CONTACT, Base, Layer, LongWavePreconditioner, LongWaves
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -27,6 +27,21 @@ def test_incompressible_bonded_layer() -> None:
     np.testing.assert_allclose(exact, [0.05757363, 0.64145003], atol=5e-9)
     small = np.array([1e-8, 1e-4])
     np.testing.assert_allclose(Layer(1.0).compliance_ratio(small), 2 / 3 * small**3, rtol=2e-8)
+
+
+def test_half_space_below_a_small_contact() -> None:
+    """The refusal of stick on a layer states by how much a half space is too soft below a bonded disc, of a tenth of
+    the thickness in radius. With the tractions `1/sqrt(1 - r^2/a^2)`, whose transform is sin(q a)/(q a), of first order
+    in the difference. Waves of shear along them have the ratio (sinh 2x + 2x)/(cosh 2x + 1 + 2x^2), and across tanh x;
+    the latter are twice as soft."""
+    radius, x = 0.1, np.linspace(1e-3, 40.0, 40001)
+    weight = np.sinc(radius * x / np.pi) ** 2 * 2.0 * radius / np.pi
+    along = (np.sinh(2 * x) + 2 * x) / (np.cosh(2 * x) + 1 + 2 * x**2)
+    shear = (along + 2 * np.tanh(x)) / 3
+    found = [
+        100 / (1 - np.trapezoid((1 - ratio) * weight, x)) - 100 for ratio in (Layer(1.0).compliance_ratio(x), shear)
+    ]
+    assert "up to {:.0f} % too soft under pressure, {:.0f} % under shear".format(*found) in SMALL_CONTACT
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])

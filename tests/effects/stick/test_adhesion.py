@@ -13,8 +13,6 @@ from mpi4py import MPI
 from parcontact.door.simulation import Simulation
 from parcontact.effects.stick import effect
 from parcontact.effects.stick.solver import ShearOperator
-from parcontact.errors import InputError
-from parcontact.job import load
 
 G, WEAK, BOX = MODULUS / 4.0, 5e3, 3.2  # modulus and a strength [Pa], the box in radii of a contact without load
 RUBBER = {"model": "zener", "modulus_inf": G, "branches": [{"modulus": 2.0 * G, "relaxation_time": 0.3}]}
@@ -137,8 +135,3 @@ def test_restart_is_exact(tmp_path: Path, step: int) -> None:
             assert getattr(one, name) == getattr(other, name)
     for name in ("traction_x", "traction_y", "gap"):
         assert np.array_equal(again.field(name), whole.field(name))
-
-
-def test_a_coefficient_is_refused() -> None:
-    with pytest.raises(InputError, match=r"interface.coefficient cannot be used with adhesion: .*give a shear_stress"):
-        load(sheared({"coefficient": 0.5, "stick": True}))
