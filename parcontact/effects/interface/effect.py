@@ -90,8 +90,8 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if None not in (interface, adhesion) and interface.coefficient is not None:
         sentence = (
-            "cannot be used with adhesion: pressures at the edge of contact are negative, and without the attraction, "
-            "up to work/range, they depend on the range; give a shear_stress"
+            "cannot be used with adhesion: pressures are negative at the edge of contact, and the contact pressure "
+            "(pressure plus work/range) depends on the range; give a shear_stress"
         )
         yield Fault(sentence, ("interface", "coefficient"))
 

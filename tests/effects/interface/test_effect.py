@@ -147,7 +147,7 @@ def test_it_costs_nothing() -> None:
         ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
         (
             "interface: {coefficient: 0.5, stick: true}\nadhesion: {work: 0.05, range: 1.0e-6}",
-            "interface.coefficient cannot be used with adhesion: pressures at the edge of contact are negative",
+            "interface.coefficient cannot be used with adhesion: pressures are negative at the edge of contact",
         ),
     ],
 )
