@@ -68,10 +68,6 @@ class Row(Mapping[str, float]):
     error_gap: float
     error_energy: float
     cut_off: int
-    tensile_area: float
-    adhesive_force: float
-    surface_energy: float
-    snap_loss: float
     friction_viscous: float
     friction_interface: float
     flow_x: float
@@ -88,6 +84,10 @@ class Row(Mapping[str, float]):
     rounds: float
     stick_area: float
     slip_loss: float
+    tensile_area: float
+    adhesive_force: float
+    surface_energy: float
+    snap_loss: float
     flash_temperature: float
     max_temperature: float
     error_flash: float
