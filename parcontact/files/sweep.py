@@ -119,11 +119,11 @@ class SweepRun:
 
     def _report_errors(self, chosen: Sequence[Case]) -> None:
         """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy. Root only."""
-        asked = {case.number: case.job.numerics.asked.both for case in chosen}
-        for k, found in enumerate(sweep_errors(chosen)):
+        asked = {case.number: (*case.job.numerics.asked.both, math.inf) for case in chosen}
+        for k, (what, found) in enumerate(sweep_errors(chosen).items()):
             if not found:
                 continue
-            worst, what = max(found, key=lambda number: found[number]), ("friction", "the corrected contact area")[k]
+            worst = max(found, key=lambda number: found[number])
             if not self.quiet:
                 print_line(f"largest estimated error of {what}: {per_cent(found[worst], 3)}, in case {worst}")
             if beyond := [number for number, error in found.items() if exceeds(error, asked[number][k])]:
@@ -295,16 +295,21 @@ def _asks_for(case: Case, section: str) -> bool:
     return case.job.output.energy if section == "output.energy" else case.job.section(section) is not None
 
 
-def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
-    """Yield a mapping for each column of errors: from the number of each finished case to the largest error of this
-    case."""
+def sweep_errors(cases: Sequence[Case]) -> dict[str, dict[int, float]]:
+    """Return the largest error of each finished case by the number of the case, for friction, area and loss.
+
+    Without a slide the error of the area is the one of its last value, as in the table of the sweep.
+    """
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
-    for name in slide.ERRORS:
-        found: dict[int, float] = {}
+    slides = any("mu_dyn" in row or "friction" in row for row in rows)
+    area = "the corrected contact area" if slides else "the last value of the corrected contact area"
+    out: dict[str, dict[int, float]] = {}
+    for name, what in zip((*slide.ERRORS, "error_loss"), ("friction", area, "the loss"), strict=True):
+        found = out.setdefault(what, {})
         for row in rows:
             if row["state"] == "done" and (error := row.get(name, math.nan)) == error:
                 found[row["case"]] = max(error, found.get(row["case"], 0.0))
-        yield found
+    return out
 
 
 def note_failure(case: Case, reason: str) -> None:

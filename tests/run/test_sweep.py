@@ -37,6 +37,14 @@ history: [{force: 2.0e-2}, {force: 2.0e-2, velocity: 1.0e-3, distance: 5.0e-4}]
 sweep: [{history.1.velocity: [1.0e-3]}]
 numerics: {accuracy: 0.1}
 """
+OSCILLATING = """
+grid: {points: 16, size: 1.2e-3, boundary: free}
+surface: {shape: sphere, radius: 1.0e-2}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0e-2}]}
+history: [{force: 4.0e-2, duration: 0.1}, {force: {mean: 4.0e-2, amplitude: 4.0e-3, frequency: 8.0}, cycles: 1}]
+sweep: [{history.1.force.frequency: [2.0, 8.0]}]
+numerics: {accuracy: 0.2}
+"""
 CELLS = {"excess": 0.2, "most": 0.15, "more": "more points"}  # of a doubt about contacts of few cells
 
 
@@ -172,6 +180,21 @@ def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: p
         warning = f"warning: the estimated error of {what} exceeds numerics.accuracy in case {worst};"
         assert any(text.startswith(warning) for text in beyond)
     assert not warned
+
+
+def test_a_sweep_of_cycles_ends_with_the_largest_errors_of_its_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The error of the area is the one of its last value; each case has stated its mean over time, which differs."""
+    monkeypatch.chdir(tmp_path)
+    Path("job.yaml").write_text(OSCILLATING)
+    assert main(["job.yaml"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("largest estimated error of ")]
+    names = ("error_area", "the last value of the corrected contact area"), ("error_loss", "the loss")
+    for (column, what), line in zip(names, lines, strict=True):
+        errors = [float(row[column]) for row in table()]
+        worst = errors.index(max(errors))
+        assert line == f"largest estimated error of {what}: {100 * max(errors):.3g} %, in case {worst}"
 
 
 def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
