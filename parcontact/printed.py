@@ -89,11 +89,16 @@ def stated_error(error: float) -> str:
     return per_cent(error) if error <= 1.0 else "unknown"
 
 
-def with_error(value: float, error: float) -> str:
-    """Return a number and its error with two digits of the error: 0.01483 ± 0.00036.
+def with_error(value: float, error: float, unit: str = "") -> str:
+    """Return a number and its error with two digits of the error, both in one prefixed unit: 19.20 ± 0.14 mm².
 
     The number has at most MOST_DIGITS digits, and four if no error is known.
     """
+    shown, size = prefixed(unit, max(abs(value), error if error < math.inf else 0.0))
+    return f"{_with_error(value / size, error / size)} {shown}".rstrip()
+
+
+def _with_error(value: float, error: float) -> str:
     if not 0.0 < error < math.inf:
         return f"{value:.4g}"
     last = _exponent(error) - 1  # the power of ten of the last digit that is shown

@@ -336,8 +336,7 @@ def _size(job: Job, share: float, error: float) -> str:
     if job.grid.boundary != "free":
         return f"{with_error(100.0 * share, 100.0 * error)} % of the nominal area"
     box = job.grid.lx * job.grid.ly
-    within = f" ± {quantity(error * box, 'm²', 2)}" if error > 0.0 else ""
-    return f"{quantity(share * box, 'm²', 4)}{within}"
+    return with_error(share * box, error * box, "m²")
 
 
 def _headline_of_curve(directory: Path) -> str:
@@ -375,9 +374,7 @@ HEADLINES: dict[str, Callable[[Path], str]] = {
 def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:
     value, within = row[name], row.get(error, math.nan)
     within = abs(value) * within if error in (*slide.ERRORS, "error_loss") else within
-    if not unit:
-        return with_error(value, within)
-    return quantity(value, unit, 4) + (f" ± {quantity(within, unit, 2)}" if within > 0.0 else "")
+    return with_error(value, within, unit)
 
 
 def _error(columns: Columns, name: str, row: int) -> float:

@@ -42,6 +42,13 @@ def test_other_forms_are_no_others() -> None:
     assert find_other_forms("0.4 ± 0.1, 3 µm, [\\w.+-], z: um, 1e+-3, gum, to us, units: {xy: mm, z: um}") == []
 
 
+def test_a_number_and_its_error_have_one_unit() -> None:
+    """The error alone would be in µm², which is a millionth of the unit of the number."""
+    assert with_error(4.755e-8, 3.3e-10, "m²") == "0.04755 ± 0.00033 mm²"
+    assert with_error(1.92e-5, 1.4e-7, "m²") == "19.20 ± 0.14 mm²"
+    assert with_error(3.7273e-9, float("nan"), "J") == "3.727 nJ"
+
+
 def test_a_terminal_of_few_letters_has_signs_of_ascii() -> None:
     numbers = with_error(0.5, 0.01), quantity(1.5e-5, "m"), quantity(2e-9, "m²"), quantity(2.0, "m³")
     shown = ", ".join([*numbers, "20 °C, –×−, é"])

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from ...march.budget import PULL_OFF
 from ...march.time_error import Fit
-from ...printed import quantity
+from ...printed import quantity, with_error
 from ...results.results import Results
 from .effect import law_of
 
@@ -160,9 +160,7 @@ said_at_end = sentences  # also at the end of a run
 def headline(run: Results) -> Iterator[str]:
     """Yield a line with the force of the last pull-off and its error, if a pull-off was found."""
     if found := dict(swept(run)):
-        error = found["pull_off_error"]
-        known = f" ± {quantity(error, 'N', 2)}" if error == error else ""
-        yield f"the pull-off force is {quantity(found['pull_off'], 'N', 4)}{known}"
+        yield f"the pull-off force is {with_error(found['pull_off'], found['pull_off_error'], 'N')}"
 
 
 def swept(run: Results) -> Iterator[tuple[str, float]]:
