@@ -147,18 +147,21 @@ def _run(found: Results) -> Iterator[str]:
     if not columns["step"]:
         yield "  run: no step yet"
         return
-    step, time = int(columns["step"][-1]), columns["time"][-1]
+    step, time, job = int(columns["step"][-1]), quantity(columns["time"][-1], "s", 4), run.job
     ended = claim is not None and claim.finished is not None and claim.finished[0] == step
-    how = "finished" if ended else "not finished"
     if ended and run.detached:
         yield f"  {run.detached}"
-    yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
-    job = run.job
+    reached = f"step {step}, t = {time}" if ended or job is None else run.progress
+    yield f"  run: {'finished' if ended else 'not finished'} after {reached}, {len(columns['step'])} rows"
     noise = {"friction"} if job is not None and not job.directions else set[str]()  # where nothing slides
     names = {name: unit for name, unit in LAST_ROW.items() if name in columns and name not in noise}
     last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
-    yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
+    spent = math.fsum(columns["seconds"])
+    yield f"  wall time of its steps: {spent:.3g} s"
+    if not ended and step and run.steps is not None and (more := len(run.steps) - step) > 0:
+        least = "or more " * run.steps.chooses
+        yield f"  {more} steps {least}to go: {quantity(more * spent / step, 's', 2)}, if they take as long"
     yield from (f"  {text}" for text in describe_run_in_words(run))
 
 

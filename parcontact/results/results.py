@@ -24,6 +24,7 @@ from ..files import fields, files, hdf5, outputs, tables
 from ..files.outputs import Claim
 from ..files.tables import Columns
 from ..job import Job, Zener, yaml_text
+from ..job.history import Timeline
 from ..job.listing import answers
 from ..job.reading import CASES, shown_job
 from ..parallel.slab import Array
@@ -291,14 +292,23 @@ class Results:
         rows = {name: value for name, value in columns.items() if name not in ("step", "time")}
         return maps.assign_coords(step=steps, time=columns["time"]).assign(rows)
 
+    @cached_property
+    def steps(self) -> Timeline | None:
+        """The steps of a run, those to come with their expected number; None for a job without steps."""
+        if self.job is None or self.job.bands is not None:
+            return None
+        ends = zip(map(int, self.table["step"]), self.table["time"], strict=True)
+        return Timeline.from_job(self.job).follow(dict(ends))
+
     @property
     def progress(self) -> str:
         """The progress of a run or a curve, as text; '' before its first row."""
         job = self.job
         if self.kind == "run" and job is not None and self.table["time"]:
-            whole = sum(stage.seconds for stage in job.history)
-            share = f" of {quantity(whole, 's')}" if whole else ""
-            return f"step {self.table['step'][-1]:g}, t = {quantity(self.table['time'][-1], 's')}{share}"
+            whole, last = sum(stage.seconds for stage in job.history), int(self.table["step"][-1])
+            end = f" of {quantity(whole, 's', 4)}" if whole else ""
+            count = "" if self.steps is None else f" of {'at least ' * self.steps.chooses}{len(self.steps)}"
+            return f"step {last}{count}, t = {quantity(self.table['time'][-1], 's', 4)}{end}"
         if self.kind == "steady":
             return "; ".join([f"{len(self.table['velocity'])} points", *self.unfinished])
         return ""

@@ -413,7 +413,8 @@ def test_info_of_directories(here: Path, monkeypatch: pytest.MonkeyPatch, capsys
     capsys.readouterr()
     assert __main__.main(["info", "out"]) == DONE
     said = capsys.readouterr().out
-    assert "run: not finished after step 4, t = 937.5 µs, 5 rows" in said
+    assert "run: not finished after step 4 of 6, t = 937.5 µs of 1.562 ms, 5 rows" in said
+    assert "2 steps to go: " in said
     for part in ("last row: pressure 10 kPa, friction ", "friction curve: 2 points from 0.01 to 0.1 m/s", "checkpoint"):
         assert part in said
     assert "fields: pressure at 4 of 6 instants" in said
