@@ -276,10 +276,11 @@ def label_map(axes: Axes, size: tuple[float, float]) -> float:
 
 
 def thin_log_ticks(axis: Axis) -> bool:
-    """Set few ticks on a logarithmic axis. Return True if the axis has few decades, with ticks at 1, 2 and 5 times
-    powers of ten; other axes have ticks at powers of ten only."""
+    """Set few ticks on a logarithmic axis. Return True if the axis has few decades or a single power of ten, and so
+    ticks at 1, 2 and 5 times powers of ten; other axes have ticks at powers of ten only."""
     low, high = axis.get_view_interval()
-    few = bool(high < 10.0**FEW_DECADES * low)
+    powers = math.floor(math.log10(high) + ROUNDING) - math.ceil(math.log10(low) - ROUNDING) + 1
+    few = bool(powers < 2 or high < 10.0**FEW_DECADES * low)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
     axis.set_major_formatter(
         FuncFormatter(lambda value, _: _written(value) if few else _power_of_ten(round(math.log10(value))))

@@ -75,3 +75,15 @@ def test_marks_of_long_times_do_not_touch(width: float) -> None:
     boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
     assert len(boxes) >= 3
     assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
+
+
+@pytest.mark.parametrize(("low", "high"), [(1.6, 40.0), (2e-4, 8e-3), (11.0, 90.0), (0.11, 9.0), (1.0, 100.0)])
+def test_logarithmic_axes_have_several_labels(low: float, high: float) -> None:
+    """A single power of ten on an axis does not tell its values."""
+    axes = Figure().add_subplot()
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    style.thin_log_ticks(axes.xaxis)
+    inside = [place for place in axes.xaxis.get_majorticklocs() if low <= place <= high]
+    assert 2 <= len(inside) <= 7
+    assert all(axes.xaxis.get_major_formatter()(place) for place in inside)
