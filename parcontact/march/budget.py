@@ -245,6 +245,7 @@ OF_BANDS = {
     "9 % in a small area",
     "scatter": "more surfaces of each band (bands.samples)",
 }
+MESH_OF_BANDS = "more points in each band (bands.points)"
 REMEDIES = {source.name: source.remedy for source in MARCH_SOURCES} | OF_BANDS
 SHOWN = {source.name: source.shown or source.name for source in MARCH_SOURCES}
 SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
@@ -434,7 +435,8 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
-    remedy = SMALLER if worst in chosen else REMEDIES[worst]
+    in_bands = parts.method > 0.0 or parts.scatter > 0.0
+    remedy = SMALLER if worst in chosen else MESH_OF_BANDS if in_bands and worst == "mesh" else REMEDIES[worst]
     return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {remedy}"
 
 

@@ -384,6 +384,9 @@ def test_errors_of_the_area_by_the_grids_of_all_bands_add_up() -> None:
 
 
 def test_advice_on_the_coupling_of_bands_states_what_fewer_bands_leave() -> None:
-    """The least errors of two or more bands: an accuracy below them takes a single band."""
+    """The least errors of two or more bands: an accuracy below them takes a single band. A job with bands has no grid
+    to refine: its mesh is `bands.points`."""
+    mesh = advice(ErrorParts(0.01, 0.0, 0.0, 0.1, method=LEAST_OF_AREA), 0.1)
+    assert mesh.endswith("try more points in each band (bands.points)")
     text = advice(ErrorParts(0.01, 0.0, 0.0, 0.03, method=LEAST_OF_AREA), 0.1)
     assert f"at least {LEAST_METHOD:.0%} in friction and {LEAST_OF_AREA:.0%} in a small area".replace("%", " %") in text
