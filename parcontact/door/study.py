@@ -390,6 +390,8 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
         lines.append(f"for {per_cent(target)}: {found}")
     doubt = worst({name: limit.doubt for name, limit in reference.items() if limit.value})
     known = "is not known" if math.isnan(doubt) else f"is {100 * doubt:.2g} %"
+    if doubt > max(TARGETS):
+        known += ": add finer values to the lists of the study to make it smaller"
     return [*lines, f"the error of the reference, to which they are compared, {known}"]
 
 

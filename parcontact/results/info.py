@@ -277,7 +277,10 @@ Columns = Mapping[str, Sequence[float]]
 def find_headline(directory: Path) -> str:
     """Return the headline of an output directory: a sentence for each run, friction curve, sweep and study in it."""
     kinds = Results(directory).kinds
-    return " ".join(filter(None, (sentence(directory) for kind, sentence in HEADLINES.items() if kind in kinds)))
+    said = {kind: sentence(directory) for kind, sentence in HEADLINES.items() if kind in kinds}
+    if said.get("study"):  # its limit, not the range of its cases
+        said.pop("sweep", None)
+    return " ".join(filter(None, said.values()))
 
 
 def _headline_of_run(directory: Path) -> str:
@@ -366,11 +369,19 @@ def _headline_of_sweep(directory: Path) -> str:
     return ""
 
 
+def _headline_of_study(directory: Path) -> str:
+    """Return the limit of the mean friction by a study, or of the area if nothing slides; '' before its end."""
+    lines = Results(directory, "study").sentences_of_study
+    limits = [text for text in lines if " ± " in text]
+    best = [text for text in limits if text.startswith("mu_dyn")] or limits
+    return "".join(f"The study finds {text}." for text in best[:1])
+
+
 HEADLINES: dict[str, Callable[[Path], str]] = {
     "run": _headline_of_run,
     "steady": _headline_of_curve,
     "sweep": _headline_of_sweep,
-    "study": lambda directory: next(iter(Results(directory, "study").sentences_of_study), ""),  # on its accuracy
+    "study": _headline_of_study,
 }
 
 

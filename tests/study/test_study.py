@@ -156,6 +156,8 @@ def test_the_fastest_settings_that_are_accurate_enough_are_named() -> None:
     assert lines[3] == f"for 1 %: {last}; 4 s"
     assert lines[4] == "for 0.3 %: none of these settings is good enough"
     assert lines[5] == "the error of the reference, to which they are compared, is 0.4 %"
+    *_, said = study.sentences(cases, {**reference, "mu_dyn": Limit(2.0, 1.0, 0.24)}, 2)
+    assert said.endswith(" is 12 %: add finer values to the lists of the study to make it smaller")
 
 
 def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:

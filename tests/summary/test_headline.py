@@ -80,10 +80,13 @@ def test_curves_sweeps_and_studies(tmp_path: Path) -> None:
     (tmp_path / "steady.csv").unlink()
     head = ("case", "history.0.velocity", "state", "mu_max", "mu_dyn", "mu_dyn_error")
     write(tmp_path / "sweep.csv", head, (0, 0.1, "done", 0.3, 0.2, 0.02), (1, 1.0, "done", 0.2, 0.1, ""))
-    write(tmp_path / "study.csv", ("mesh",), (64,))
-    (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
     swept = "The mean friction of the cases is from 0.1 (case 1) to 0.200 ± 0.020 (case 0)."
-    assert info.find_headline(tmp_path) == f"{swept} for 1 %: mesh 64"
+    assert info.find_headline(tmp_path) == swept
+    write(tmp_path / "study.csv", ("mesh",), (64,))
+    limits = [f"{name} with exponential, mesh alone: 0.25 ± 0.01 (4 %), order 2" for name in ("mu_max", "mu_dyn")]
+    lines = ["the time steps of press are chosen in every case", *limits, "for 1 %: mesh 64"]
+    (tmp_path / "study.txt").write_text("".join(f"{line}\n" for line in lines))
+    assert info.find_headline(tmp_path) == f"The study finds {limits[1]}."
     assert not info.find_headline(tmp_path / "nowhere")
 
 
