@@ -27,6 +27,7 @@ PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "lo
 MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
 MARK_EVERY = 0.15  # distance of the marks of a line of many points, over the diagonal of a panel
 PALEST = 0.75  # share of white in the bars of the longest waves in a comparison
+APART = 10.0  # ratio of the longest to the shortest time of runs above which a common axis of time hides the shortest
 FAILED_CASES = 3  # most failed cases that a picture names
 
 
@@ -137,9 +138,23 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         lacking = f"it has neither {outputs.RUN.table} nor {outputs.STEADY.table}{_suggest(directory)}"
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
-        raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
+        raise InputError(_describe_lack(directory, options))
     lines = *titles[:1], info.describe_settings(directory), *_name_missing(directory)
     return picture("\n".join(filter(None, lines)), groups, fields, options.log)
+
+
+def _describe_lack(directory: Path, options: PlotOptions) -> str:
+    """Return why a directory has no panel to draw, and what can be drawn."""
+    kinds = Results(directory).kinds
+    if options.compare and "sweep" in kinds:
+        return f"{directory} is a sweep, which has nothing to compare; give its cases, {directory / CASES}/*"
+    if not options.panels:
+        return f"{directory} has nothing to compare: it has neither a run of several rows nor a friction curve"
+    there = [one.key for one in plotted_run.panels_of_run(PlottedRun(directory))] if "run" in kinds else []
+    there += ["steady"] * ("steady" in kinds) + ["maps"] * (directory / outputs.RUN.maps).is_file()
+    there += [one.key for one in band_charts.panels_of_sweep(directory)] if "sweep" in kinds else []
+    has = f"; it has {', '.join(dict.fromkeys(there))}" if there else ""
+    return f"{directory} has none of the panels {', '.join(options.panels)}{has}"
 
 
 def _suggest(path: Path) -> str:
@@ -153,9 +168,9 @@ def _suggest(path: Path) -> str:
 
 def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figure:
     """Draw the lines of all directories in one picture."""
-    found = [_find_panels(directory, options) for directory in directories]
+    found = _find_common(directories, options)
     if [] in found:
-        raise InputError(f"{directories[found.index([])]} has nothing to compare")
+        raise InputError(_describe_lack(directories[found.index([])], options))
     names = name_directories(directories)
     lost = zip(names, (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
@@ -164,14 +179,26 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
 
 def compare_panels(directories: Sequence[Path]) -> list[Panel]:
     """Return the panels that at least two directories have, each with the lines of all directories."""
-    pairs = zip(name_directories(directories), (_find_panels(one, PlotOptions()) for one in directories), strict=True)
+    pairs = zip(name_directories(directories), _find_common(directories, PlotOptions()), strict=True)
     return compare([pair for pair in pairs if pair[1]], 2)
 
 
-def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
+def _find_common(directories: Sequence[Path], options: PlotOptions) -> list[list[Panel]]:
+    """Return the panels of each directory. Runs that slide equally far in very different times are drawn over the
+    distance, if the options do not choose: over time the fastest runs would be invisible."""
+    runs = [Results(one, "run").table for one in directories if (one / outputs.RUN.table).is_file()]
+    over = options.over
+    if runs and not over:
+        times, ways = ([max(table[name], default=0.0) for table in runs] for name in ("time", "distance"))
+        if max(times) > APART * min(times) and max(ways) < APART * min(ways):
+            over = "distance"
+    return [_find_panels(one, options, over) for one in directories]
+
+
+def _find_panels(directory: Path, options: PlotOptions, over: str) -> list[Panel]:
     found: list[Panel] = []
     if (directory / outputs.RUN.table).is_file():
-        found += options.choose(plotted_run.panels_of_run(PlottedRun(directory), options.over))
+        found += options.choose(plotted_run.panels_of_run(PlottedRun(directory), over))
     if (directory / outputs.STEADY.table).is_file() and options.wants("steady"):
         found += band_charts.panels_of_curve(directory, options.over)
     return found

@@ -219,11 +219,35 @@ def test_comparison(tmp_path: Path, drawn: list[Figure]) -> None:
     assert touching(drawn[0]) == []
 
 
+def test_slow_and_fast_slides_are_compared_over_their_way(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Over time the fast one would take a hundredth of the axis; of slides of similar times nothing changes."""
+    press, runs = "{pressure: 1.0e3, duration: 1.0e-4, time_step: 1.0e-4}", []
+    for speed in (0.1, 0.2, 10.0):
+        (tmp_path / f"{speed:g}").mkdir()
+        slide = f"{{pressure: 1.0e3, velocity: {speed}, distance: 2.5e-4, cells_per_step: 1}}"
+        runs.append(ran(tmp_path / f"{speed:g}", f"{WAVE}{ZENER}history: [{press}, {slide}]\n"))
+    for chosen, label in ((runs[:2], "time [ms]"), (runs, "distance slid [µm]")):
+        assert asked(*chosen, "--compare", "--panels", "area", "--out", tmp_path / "both.png") == 0
+        assert drawn.pop().axes[0].get_xlabel() == label
+
+
+def test_what_a_directory_has_is_named_where_nothing_can_be_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A curve has one key for its panels; a sweep is compared by its cases."""
+    one = curve(tmp_path / "curve")
+    assert asked(one, "--panels", "friction") == 2
+    assert f"{one} has none of the panels friction; it has steady" in capsys.readouterr().err
+    (tmp_path / "sweep.csv").write_text("case,history.0.velocity,state,mu_dyn\n0,0.1,done,0.1\n")
+    assert asked(one, tmp_path, "--compare", "--out", tmp_path / "both.png") == 2
+    assert f"is a sweep, which has nothing to compare; give its cases, {tmp_path}/cases/*" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "stated"),
     [
         (["--panels", "nonsense"], "there is no 'nonsense'"),
-        (["--panels", "energy"], "none of the panels energy"),
+        (["--panels", "energy"], "none of the panels energy; it has area, "),
         (["--log", "z"], "there is no axis 'z'"),
         (["--out", "picture.docx"], "must end in .png, .pdf, .svg; or give --format"),
         (["--out", "nowhere/picture.png"], "cannot write nowhere/picture.png"),
