@@ -12,7 +12,7 @@ Points of a sweep are cases, and lines are the means of the cases over seeds. Ea
 own line and colour. Lines of different values of further keys have different dashes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -43,9 +43,10 @@ STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
 SAME = 1e-9  # rounding: of distances
 
 
-def panels_of_bands(directory: Path) -> list[Panel]:
+def panels_of_bands(directory: Path, differing: Collection[str] = ()) -> list[Panel]:
     """Return panels of the bands of a friction curve (bands.csv) at the first pressure and temperature in this table,
-    with the lines of the theory for the same pressure and temperature."""
+    with the lines of the theory for the same pressure and temperature. Their axes name those of both that vary, or that
+    are `differing` among several curves."""
     curve = Results(directory, "steady")
     if "velocity" not in curve.read(outputs.BANDS):
         return []
@@ -62,8 +63,8 @@ def panels_of_bands(directory: Path) -> list[Panel]:
         if name in columns and np.isfinite(columns[name]).any():
             found.append(_over_bands(one.key, columns, None, name, one.y))
     firsts = [(name, float(whole[name][0]), unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
-    several = [printed.quantity(value, unit) for name, value, unit in firsts if count_different(whole[name]) > 1]
-    if at := ", ".join(several):
+    named = (one for one in firsts if one[0] in differing or count_different(whole[one[0]]) > 1)
+    if at := ", ".join(printed.quantity(value, unit) for _, value, unit in named if value == value):
         found = [replace(panel, y=replace(panel.y, name=f"{panel.y.name}\nat {at}")) for panel in found]
     return found
 
@@ -182,10 +183,18 @@ COLD = "friction_cold"  # friction without feedback from heat
 THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
 
 
-def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
+def find_differing(directories: Sequence[Path]) -> list[str]:
+    """Return which of temperature and pressure differ among the points of several friction curves."""
+    tables = [Results(directory, "steady").table for directory in directories]
+    found = {name: [value for table in tables for value in table.get(name, ())] for name in ("temperature", "pressure")}
+    return [name for name, values in found.items() if count_different(np.array(values)) > 1]
+
+
+def panels_of_curve(directory: Path, over: str = "", differing: Collection[str] = ()) -> list[Panel]:
     """Return panels of a table of steady states against the velocity; against the load if `over` is "load", or by
     default if the load alone varies. The list is empty without a state, and for `over` "time" or "distance", which
-    states do not have."""
+    states do not have. Lines are named by temperature and load if they vary, or are `differing` among several
+    curves."""
     curve = Results(directory, "steady")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
     if over in ("time", "distance") or not columns["velocity"].size:
@@ -202,10 +211,12 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
     x, by = "velocity", "load"
     if over == "load" or (not over and count_different(columns[x]) < 2 <= count_different(columns[by])):
         x, by = by, x
-    several = [name for name in ("temperature", by) if name in columns and count_different(columns[name]) > 1]
+    shared = {"load" if name == "pressure" else name for name in differing}
+    names = [name for name in ("temperature", by) if name in columns and np.isfinite(columns[name]).all()]
+    several = [name for name in names if name in shared or count_different(columns[name]) > 1]
     lines = {name: axes[name].unit for name in several or [by]}
     panels = [("steady friction", x, "friction"), ("steady area", x, "area")]
-    if "temperature" in several and x == "velocity":
+    if "temperature" in several and x == "velocity" and "reduced" in columns:
         panels.append(("steady master", "reduced", "friction"))
     for one in offered("CURVE_PANELS"):
         (name,) = one.columns.values()
@@ -228,7 +239,7 @@ def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / outputs.STEADY.resolved)
         found += [panel for panels_of in answers("pictures", "curve_panels", job) for panel in panels_of(job, columns)]
-    return found + (panels_of_bands(directory) if x == "velocity" else [])
+    return found + (panels_of_bands(directory, differing) if x == "velocity" else [])
 
 
 def steady_title(directory: Path) -> str:

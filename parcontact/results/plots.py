@@ -192,15 +192,17 @@ def _find_common(directories: Sequence[Path], options: PlotOptions) -> list[list
         times, ways = ([max(table[name], default=0.0) for table in runs] for name in ("time", "distance"))
         if max(times) > APART * min(times) and max(ways) < APART * min(ways):
             over = "distance"
-    return [_find_panels(one, options, over) for one in directories]
+    curves = [one for one in directories if (one / outputs.STEADY.table).is_file()]
+    differing = band_charts.find_differing(curves) if options.wants("steady") else []
+    return [_find_panels(one, options, over, differing) for one in directories]
 
 
-def _find_panels(directory: Path, options: PlotOptions, over: str) -> list[Panel]:
+def _find_panels(directory: Path, options: PlotOptions, over: str, differing: Sequence[str]) -> list[Panel]:
     found: list[Panel] = []
     if (directory / outputs.RUN.table).is_file():
         found += options.choose(plotted_run.panels_of_run(PlottedRun(directory), over))
     if (directory / outputs.STEADY.table).is_file() and options.wants("steady"):
-        found += band_charts.panels_of_curve(directory, options.over)
+        found += band_charts.panels_of_curve(directory, options.over, differing)
     return found
 
 

@@ -285,6 +285,20 @@ def test_cases_of_a_sweep_are_distinguished_by_their_keys(tmp_path: Path, drawn:
         assert entries(drawn.pop()) == [f"{name}, 1.04 kPa" for name in expected]
 
 
+def test_curves_are_compared_by_what_differs_among_them(tmp_path: Path, drawn: list[Figure]) -> None:
+    """A curve at one temperature has the mark of this temperature, as a curve at two has."""
+    head = "velocity,pressure,temperature,friction,contact_area\n"
+    for name, degrees in (("two", (10.0, 40.0)), ("one", (40.0,))):
+        (tmp_path / name).mkdir()
+        rows = [f"{v},1.0e5,{t},0.2,0.1\n" for t in degrees for v in (0.1, 1.0)]
+        (tmp_path / name / "steady.csv").write_text(head + "".join(rows))
+    pair = tmp_path / "two", tmp_path / "one"
+    assert asked(*pair, "--compare", "--out", tmp_path / "both.png") == 0
+    assert entries(drawn[0]) == ["two", "one", "10 °C", "40 °C"]
+    marks = [line.get_marker() for line in drawn[0].axes[0].get_lines() if len(line.get_xdata()) == 2]
+    assert marks == ["o", "s", "s"]
+
+
 def test_table_without_a_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "steady.csv").write_text("velocity,pressure\n1.0,2.0\n")
     assert asked(tmp_path) == 2
