@@ -315,11 +315,11 @@ WARN_OUT_OF_THE_BOX = Kind(
 
 def _room(job: Sections) -> Iterator[Doubt]:
     """Yield warnings if the least contact of a single sphere is too large for its radius, or the relaxed one leaves the
-    box."""
+    box. Yield none for a body that is no half space, on which contacts are smaller."""
     material = job.material.fitted
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
-    if not single or any(grid.cyclic):
+    if not single or any(grid.cyclic) or job.asked("response"):
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
     if not (0.0 <= x <= grid.lx and 0.0 <= y <= grid.ly):

@@ -60,10 +60,11 @@ from ...job import limits
 from ...job.advice import more_points
 from ...job.parts import Part, Positive, Rule, rules_of
 from ...job.stages import Stage
-from ...job.surfaces import Flat, Rough, Sphere, Wave, wave_numbers
+from ...job.surfaces import Flat, Indenter, Rough, Wave, wave_numbers
 from ...job.yaml_text import Fault
 from ...parallel.slab import Array, Slab
 from ...physics.halfspace import Response, Vector
+from ...physics.records import Measures
 from ...printed import rounded_up
 from ..effect import Decision, Effect
 
@@ -461,14 +462,25 @@ WARN_DEEP_FOR_A_LAYER = Kind(
 
 
 def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
-    """Yield a warning if the approach of a sphere is too large for the thickness [m]."""
-    if len(surface) != 1 or not isinstance(surface[0], Sphere):
+    """Yield a warning if the prescribed approach of an indenter is too large for the thickness [m]."""
+    if not _is_indenter(surface):
         return
     approaches = [(stage.load.highest, index) for index, stage in enumerate(history) if stage.control == "approach"]
     deepest, index = max(approaches, default=(0.0, 0))
     if deepest > THICKEST * thickness:
         numbers = {"approach": deepest, "thickness": thickness}
         yield WARN_DEEP_FOR_A_LAYER(f"history.{index}.approach", numbers)
+
+
+WARN_PRESSED_DEEP = Kind(
+    "pressed deep",
+    "{where}: the indenter is {approach:.3g} m deep in the layer, more than a third of its thickness "
+    "({thickness:g} m), so strains are not small; use a smaller load, or a thicker layer",
+)
+
+
+def _is_indenter(surface: tuple[Any, ...]) -> bool:
+    return len(surface) == 1 and isinstance(surface[0], Indenter)
 
 
 def _least_height(surface: tuple[Any, ...]) -> float:
@@ -495,6 +507,14 @@ class RubberLayer(Effect[None]):
     rules: ClassVar[tuple[Rule, ...]] = RULES
     doubts = staticmethod(doubts_of_layer)
     doubt_heights = staticmethod(doubt_span)
+
+    @staticmethod
+    def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
+        """Yield a warning if a load presses an indenter too deeply into the layer."""
+        deep = _is_indenter(job.surface) and measures.approach > THICKEST * job.body.thickness
+        if deep and not any(_indented(job.surface, job.body.thickness, job.history)):
+            numbers = {"where": where, "approach": measures.approach, "thickness": job.body.thickness}
+            yield WARN_PRESSED_DEEP("", numbers)
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -6,9 +6,11 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
-from parcontact.march.sanity import check_heights
+from parcontact.job.history import Timeline
+from parcontact.march.sanity import ContactWatch, check_heights
 from parcontact.march.scene import set_up
 from parcontact.parallel.slab import Slab
+from parcontact.physics.records import Measures
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2e-4}
 WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}
@@ -69,6 +71,37 @@ def test_an_indenter_deeper_than_a_third_of_the_layer() -> None:
     assert warnings(1.21e-4, sphere, history=[press]) == []
     (text,) = warnings(1.19e-4, sphere, history=[press])
     assert text.startswith("history.0.approach: 4e-05 m is more than a third of the layer")
+
+
+@pytest.mark.parametrize("shape", [{"shape": "sphere", "radius": 1e-2}, {"shape": "cone", "slope": 0.1}])
+def test_an_indenter_that_its_load_presses_deep(shape: Any) -> None:
+    """The depth is known after the step only. A wave has no depth: its approach counts from its mean plane."""
+    sheet = {"thickness": 4.2e-3}
+    job = Job.model_validate({**_free(shape), "history": [{"force": 1e-3}], "body": sheet})
+    watch = ContactWatch.of(job, Timeline.from_job(job))
+    assert watch.check_step(1, Measures(approach=1.39e-3)) == []
+    (found,) = watch.check_step(1, Measures(approach=1.41e-3))
+    assert str(found).startswith("step 1: the indenter is 0.00141 m deep in the layer, more than a third of its thick")
+    assert watch.check_step(2, Measures(approach=2e-3)) == []  # once in a run
+    waves = Job.model_validate({**_free(WAVE), "grid": {"points": 16, "size": 1e-3}, "body": sheet})
+    assert ContactWatch.of(waves, Timeline.from_job(waves)).check_step(1, Measures(approach=2e-3)) == []
+
+
+def test_a_contact_on_a_layer_is_no_contact_on_a_half_space() -> None:
+    """Hertz's contact would be larger than the sphere and leave the box; on a thin layer it is far smaller."""
+    sphere = {**_free({"shape": "sphere", "radius": 8e-3}), "history": [{"force": 50.0}]}
+    assert len(Job.model_validate(sphere).warnings) == 2
+    assert Job.model_validate({**sphere, "body": {"thickness": 4e-3}}).warnings == ()
+
+
+def _free(shape: Any) -> dict[str, Any]:
+    """Return a job with an indenter in a free box of 26 mm on soft rubber."""
+    return {
+        "grid": {"points": 16, "size": 2.6e-2, "boundary": "free"},
+        "surface": shape,
+        "material": {"model": "elastic", "shear_modulus": 3e4},
+        "history": [{"pressure": 1e3}],
+    }
 
 
 def test_waves_to_which_rubber_is_compressible() -> None:
