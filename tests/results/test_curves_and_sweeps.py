@@ -145,7 +145,7 @@ def test_how_far_a_running_sweep_is(curve: Path) -> None:
     (home / "sweep.csv").write_text("\n".join(["case,history.0.velocity,state,mu_dyn,seconds", *rows, ""]))
     said, sound = info.describe_path(home)
     assert sound
-    assert "case 1: step 1, t = 500 ms of 2 s" in said
+    assert "case 1: step 1 of 21, t = 500 ms of 2 s" in said
     assert "2 cases to go: 40 s" in said
     assert info.find_headline(home).endswith("to 5 (case 4); it still rises at the highest velocity.")
 
