@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..errors import RunError
 
 if TYPE_CHECKING:
-    from .slab import MPI
+    from .slab import MPI, Array, Slab
 
 T = TypeVar("T")
 
@@ -50,6 +50,13 @@ def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
     if problem is not None:
         raise problem
     return value
+
+
+def with_whole_maps(slab: Slab, act: Callable[..., T], *fields: Array) -> T:
+    """Return or raise on every rank what `act` returns or raises on root. The arguments of `act` are the whole maps of
+    `fields`, shape (ny, nx). Collective."""
+    whole = [slab.to_root(field) for field in fields]
+    return on_root(slab.comm, lambda: act(*whole))
 
 
 def _packed(error: Exception) -> bytes:

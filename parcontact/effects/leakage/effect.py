@@ -20,7 +20,7 @@ from ...job import limits
 from ...job.parts import Count, NonNegative, Part, Positive, Rule, rules_of
 from ...job.stages import Ramp, Stage
 from ...job.yaml_text import Fault, quote, refuse
-from ...parallel.root import on_root
+from ...parallel.root import with_whole_maps
 from ...parallel.slab import Array
 from ...physics.records import Entry, Saved, Units
 from ..effect import Changes, ContactLaw, Decision, Detached, Effect, Instant, end_in
@@ -282,14 +282,12 @@ class LeakageColumns(Effect[tuple[float, ...]]):
         scene, setup = self._scene, self._scene.setup
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
         gap = scene.gap(instant.displacement, instant.step.position, approach)
-        whole = scene.slab.to_root(np.where(instant.touching, 0.0, np.maximum(gap, 0.0)))
 
-        def act() -> tuple[float, float, float]:
-            assert whole is not None
+        def act(whole: Array) -> tuple[float, float, float]:
             found = leak(whole, setup.grid.size, setup.grid.cyclic)
             return found.flow_x, found.flow_y, found.constriction
 
-        return Changes(on_root(scene.slab.comm, act))
+        return Changes(with_whole_maps(scene.slab, act, np.where(instant.touching, 0.0, np.maximum(gap, 0.0))))
 
     def values(self, memory: tuple[float, ...]) -> Sequence[float]:
         return memory

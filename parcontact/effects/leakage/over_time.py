@@ -399,7 +399,7 @@ def write_leakage(
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
     chosen = max(range(len(rows)), key=lambda k: _tells(rows[k], k))
-    yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
+    yield from _describe_fluid(gaps, drop, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
     if drop and total:
         yield from describe_cover(curves[0], drop, [row.pressure for row in rows], rows[chosen].pressure)
     yield from _describe_missing(gaps, at)
@@ -471,10 +471,8 @@ def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
         yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
 
 
-def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
+def _describe_fluid(gaps: Gaps, drop: PressureDrop, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
     """Yield sentences on the flow of the fluid in the row `last`, and on gaps that are too narrow for a continuum."""
-    drop = gaps.drop
-    assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
     sizes, parts = (gaps.size, gaps.size[::-1]), last.parts or [(flows[0], flows[0]) for flows in solved.of_fluid]
     if not drop.total and drop.high - drop.low > UNEQUAL * last.pressure:

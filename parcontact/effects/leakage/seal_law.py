@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from ...contact.problem import Contact, Control, MeanPressure
 from ...job.history import Step
 from ...parallel import regrid
-from ...parallel.root import on_root
+from ...parallel.root import with_whole_maps
 from ...parallel.slab import Array
 from ...physics.body import Trial
 from ...physics.records import Entry, Measures, Saved, Units
@@ -365,31 +365,25 @@ class SealLaw:
     def _advance(self, rounds: Rounds, share: Array, gap: Array, most: float) -> Verdict:
         """Solve for the flow in a gap, and put the share of the next round into a map unless the rounds end;
         collective."""
-        whole, old = self.slab.to_root(gap), self.slab.to_root(share)
         found = list[Array]()
 
-        def act() -> Verdict:
-            assert whole is not None
-            assert old is not None
+        def act(whole: Array, old: Array) -> Verdict:
             verdict, then = rounds.advance(whole, old, most)
             found.append(then)
             return verdict
 
-        verdict = on_root(self.slab.comm, act)
+        verdict = with_whole_maps(self.slab, act, gap, share)
         if not (verdict.settled or verdict.lifted):
             share[...] = self.slab.from_root(found[0] if found else None)
         return verdict
 
     def _numbers(self, drop: PressureDrop, share: Array, gap: Array, rounds: Rounds | None) -> dict[str, float]:
         """Return the columns of the flow; collective."""
-        whole, shares = self.slab.to_root(gap), self.slab.to_root(share)
 
-        def act() -> dict[str, float]:
-            assert whole is not None
-            assert shares is not None
+        def act(whole: Array, shares: Array) -> dict[str, float]:
             return seal_flow(whole, drop, shares, self._size, rounds)
 
-        return on_root(self.slab.comm, act)
+        return with_whole_maps(self.slab, act, gap, share)
 
     def motion(self, solved: SolvedContact[SealMemory], before: Measures, now: Measures) -> EdgeMotion:
         """Return no motion: the motion of edges in a step is not limited."""
