@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 
 from .. import printed
@@ -246,7 +247,7 @@ def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array
     return np.where(touching, traction, np.nan), np.where(touching, share, np.nan)
 
 
-def _under_traction(traction: Array, pressure: Array, coefficient: float | None) -> Array:
+def _under_traction(traction: Array, pressure: Array, coefficient: float | None) -> NDArray[np.bool_]:
     """Return the map of points that touch. A shear strength acts at all of them, also where they pull; adhesion leaves
     small positive pressures elsewhere, by the errors of solves."""
     return pressure > 0.0 if coefficient is not None or not traction.any() else traction != 0.0

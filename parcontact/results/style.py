@@ -217,8 +217,8 @@ def _width(figure: Figure | SubFigure) -> float:
 
 def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
     """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
-    place = axes.get_subplotspec()
-    width = _width(axes.figure) / (place.get_gridspec().ncols if place else 1)
+    cell = axes.get_subplotspec()
+    width = _width(axes.figure) / (cell.get_gridspec().ncols if cell else 1)
     if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
         axes.legend(entries.values(), entries)
         return 0.0
