@@ -155,7 +155,9 @@ def _run(found: Results) -> Iterator[str]:
     yield f"  run: {'finished' if ended else 'not finished'} after {reached}, {len(columns['step'])} rows"
     noise = {"friction"} if job is not None and not job.directions else set[str]()  # where nothing slides
     names = {name: unit for name, unit in LAST_ROW.items() if name in columns and name not in noise}
-    last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
+    values = {name: columns[name][-1] for name in names}
+    values["pressure"] = float(slide.balanced(values["pressure"], columns["max_pressure"][-1]))
+    last = [f"{name} {quantity(values[name], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
     spent = math.fsum(columns["seconds"])
     yield f"  wall time of its steps: {spent:.3g} s"

@@ -26,7 +26,7 @@ from ..parallel.slab import Array
 from . import style
 from .panels import Axis, ColumnPanel, Line, Panel, Shade, offered
 from .results import Results
-from .slide import friction_along, way_along
+from .slide import balanced, friction_along, lacks_load, way_along
 
 FRACTION = "contact area /\nnominal area"
 MEASURED = (
@@ -48,6 +48,7 @@ class PlottedRun(Results):
         if not self._all["step"].size:
             raise InputError(f"{directory} has no step yet")
         first = int(self._all["pressure"][0] == 0.0 and self._all["step"].size > 1)
+        self._all["pressure"] = balanced(self._all["pressure"], self._all["max_pressure"])
         self.columns = {name: values[first:] for name, values in self._all.items()}
         self.lasts, self.slides = self._all["time"][-1] > 0.0, self._all["distance"][-1] > 0.0
 
@@ -318,8 +319,11 @@ def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
     columns = dict(run.columns)
     load_axis, columns["load"] = run.load
     area_axis, columns["area"] = to_contact_area(columns["contact_area_corrected"], run.area * run.free)
-    columns["approach"] = np.where(columns["load"] != 0.0, columns["approach"], np.nan)
+    columns["approach"] = np.where((columns["load"] != 0.0) | (columns["area"] > 0.0), columns["approach"], np.nan)
     friction = Axis("friction coefficient" + "\nalong x" * signed), {"": "friction_x" if signed else "friction"}
+    if run.slides and lacks_load(columns):
+        columns["force"] = -columns["force_x"] if signed else np.hypot(columns["force_x"], columns["force_y"])
+        friction = Axis("tangential force" + "\nagainst x" * signed, "N"), {"": "force"}
     first = ColumnPanel("friction", *friction), ColumnPanel("area", area_axis, {"": "area"})
     load = ColumnPanel("load", load_axis, {"": "load"})
     shown = _shown(run, along, load_axis, columns)
@@ -337,7 +341,7 @@ def _shown(run: PlottedRun, along: Abscissa, load_axis: Axis, columns: Mapping[s
     """Return whether the panels that not all runs have show anything."""
     load = columns["load"]
     return {
-        "friction": run.slides and bool(columns["friction"].any()),  # friction is 0 without a load
+        "friction": run.slides and bool(columns["friction"].any() or "force" in columns),  # 0 of a flat surface
         "approach": run.free and along.axis.name != "approach",
         "gap": not run.free and columns["area"].min() < 1.0,
         "load": run.lasts and along.axis != load_axis and bool(np.ptp(load) > 1e-9 * np.abs(load).max()),

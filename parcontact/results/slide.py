@@ -56,6 +56,7 @@ from ..printed import per_cent, quantity, stated_error, with_error
 LATE = 0.9  # accuracy: share of the distance beyond which a maximum may still rise
 DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # rounding: relative difference below which instants are the same
+BALANCED = 1e-12  # rounding: mean pressure over the highest pressure that may be the error of a sum over the box
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
 RELATIVE = {"friction": ERRORS[:1], CORRECTED: ERRORS[1:]}  # column of the relative error of a column
@@ -119,6 +120,18 @@ def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
     """Return the rows, except the first, that have a tangential force and no load, or a tensile one."""
     (friction,) = _at(columns, rows, "friction")
     return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
+
+
+def lacks_load(columns: Mapping[str, Sequence[float]]) -> bool:
+    """Return True if friction is not defined in a row of a slide, for want of a load that presses."""
+    slid = np.flatnonzero(np.diff(columns["distance"], prepend=0.0) > 0.0)
+    return _without_load(columns, np.array([0, *slid])).size > 0
+
+
+def balanced(pressure: ArrayLike, highest: ArrayLike) -> Array:
+    """Return mean pressures, set to 0 where they are the rounding error of pressure and tension in balance, in units of
+    the `highest` pressures."""
+    return np.where(np.abs(pressure) > BALANCED * np.asarray(highest), pressure, 0.0)
 
 
 def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.float64]:

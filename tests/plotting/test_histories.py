@@ -135,6 +135,21 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
     assert legend.get_window_extent().y1 <= found["energy"].get_window_extent().y0
 
 
+def test_a_slide_without_load_is_drawn_with_its_force(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Friction is not defined, and 0 in the table. A load that is the rounding of pressure and tension is 0 N."""
+    stick = "adhesion: {work: 0.05, range: 3.0e-6}\ninterface: {shear_stress: 1.0e4, stick: true}\n"
+    slide = "{force: 0.0, velocity: 1.0e-4, distance: 2.0e-5, cells_per_step: 0.5}"
+    history = f"history: [{{force: 1.0e-3, duration: 1.0, time_step: 1.0}}, {slide}]\noutput: {{fields: [pressure]}}\n"
+    out = ran(tmp_path, SPHERE + ELASTIC + stick + history)
+    plots.plot([out])
+    found = {axes.get_ylabel().split(" [")[0]: axes for axes in drawn[0].axes if axes.get_lines()}
+    assert "friction coefficient" not in found
+    force = np.array(found["tangential force"].get_lines()[0].get_ydata())
+    assert np.allclose(force, -np.array(tables.read_columns(out / "measures.csv")["force_x"])[-force.size :], rtol=1e-2)
+    assert any(axes.get_title().endswith(" s, 0 N") for axes in drawn[0].axes)
+    assert "last row: pressure 0 Pa," in info.describe_files(out)[0]
+
+
 def test_a_cycle_of_stick_is_drawn_as_a_loop(tmp_path: Path, drawn: list[Figure]) -> None:
     """Friction over the displacement, which returns; and the energy lost in slip is named."""
     stick = "interface: {coefficient: 0.5, stick: true}\noutput: {energy: true}\n"
