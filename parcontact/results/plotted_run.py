@@ -331,7 +331,7 @@ def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
         lines = {name: columns[column] for name, column in one.columns.items() if column in columns}
         if lines and shown.get(one.key, True):
             found = Panel(one.key, along.axis, one.y, along.series(lines), bottom=one.key != "approach")
-            peak = one.key == "friction"
+            peak = one.key == "friction" and not one.y.unit
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
     for panels_of in answers("pictures", "panels"):
         yield from panels_of(run, along)
