@@ -380,6 +380,7 @@ class HeatOfBands:
     def __init__(self, job: Job, cut: Cut) -> None:
         self.moves, self._job, self._cut = feeds_back(job), job, cut
         self._highest = highest_temperature_of(job.material) if self.moves else math.inf
+        self._rises, self._rounds, self._cold = np.zeros(cut.count), 1, math.nan  # without feedback nothing begins
 
     def begin(self, road: RoadSliding) -> None:
         self._rises, self._rounds, self._cold = np.zeros(self._cut.count), 0, math.nan
