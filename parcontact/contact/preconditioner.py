@@ -15,8 +15,8 @@ with the grid. The grid is taken as periodic, also for free boxes. Maps of cells
 
 Each cell joins two by two cells, or only two cells, of the next finer grid. Pairs of cells are joined first, until
 points are about as far from each other along x as along y, as fields that are smooth over square cells are not smooth
-over long ones. Interpolation takes 3/4 of the value of a point's own cell and 1/4 of that of the nearest other cell,
-along each side.
+over long ones. Interpolation takes 3/4 of the value of a point's own cell and 1/4 of the value of the nearest other
+cell, along each side.
 
 The functions and loops have these arguments:
 

@@ -80,7 +80,7 @@ class Choices:
 
     @cached_property
     def time_factor(self) -> float:
-        """Shift factor a_T [-]: relaxation times divided by those at the reference temperature."""
+        """Shift factor a_T [-]: relaxation times divided by their values at the reference temperature."""
         return time_factor_of(self.job.material)
 
     @property

@@ -11,7 +11,7 @@ belongs to the state of a run, so that a restarted run continues identically.
 
 The last solve before a change of velocity or load, and a steady start, have a small tolerance: the body remembers the
 error of the displacement, and a much larger modulus may multiply this error after the change. The first and the last
-step of a stage have a small tolerance, too. Their solves have worse starts than those of the other steps, from which
+step of a stage have a small tolerance, too. Their solves have worse starts than the solves of other steps, from which
 the factor follows: the last step of a stage seldom moves the surface by whole cells.
 
 **Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is OF_STEPS times

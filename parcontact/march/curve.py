@@ -128,7 +128,7 @@ class CurveTable:
         self._console.log(text)
 
     def warn(self, doubts: Sequence[Doubt], shown: Callable[[Doubt], bool] = always) -> None:
-        """Write warnings to the log, and print those for which `shown` returns True, also with --quiet."""
+        """Write warnings to the log, and print the warnings for which `shown` returns True, even with --quiet."""
         for doubt in doubts:
             self._console.warn(str(doubt), shown(doubt))
 
@@ -272,8 +272,8 @@ def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
     """Return the request for a friction curve. Velocities [m/s], pressures [Pa] and temperatures [deg C] that are not
-    given as arguments are those of the job's section `steady`. Raises InputError if velocities or pressures are missing
-    or not positive, or if an effect of the job forbids friction curves."""
+    given as arguments are taken from the job's section `steady`. Raises InputError if velocities or pressures are
+    missing or not positive, or if an effect of the job forbids friction curves."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))

@@ -263,8 +263,9 @@ class March:
         return Timeline.from_job(self.scene.job, until, self.state.chosen)
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
-        """Yield the steps after the last one made, each decided on demand; collective. A step that replaces several
-        steps of the timeline ends no later than the first step of the timeline that reaches `until` [s]."""
+        """Yield the steps that follow the last step made; collective. Each step is chosen only when the iterator
+        reaches it. A step that replaces several steps of the timeline ends no later than the first step of the timeline
+        that reaches `until` [s]."""
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
         while self.row.step < len(timeline) and not self.detached:

@@ -355,7 +355,7 @@ WARN_FREQUENCIES = Kind(
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
-    are those of a friction curve. Without a curve, the temperature of the material is used."""
+    are the temperatures of a friction curve. Without a curve, the temperature of the material is used."""
     if (body := _body(job)) is None:
         return
     if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job

@@ -136,8 +136,8 @@ class Scene:
         return self.setup.units
 
     def relax(self, memories: Memories) -> None:
-        """Set all relaxation times to those at the job's temperature, multiplied by the factors of the effects. The
-        factors follow from the `memories` of the effects. Raises RunError."""
+        """Set all relaxation times to their values at the job's temperature, multiplied by the factors of the effects.
+        The factors follow from the `memories` of the effects. Raises RunError."""
         factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
         if factor == self.time_factor:
             return

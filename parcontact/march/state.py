@@ -409,7 +409,8 @@ class _ChosenStepsPart:
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step; its maps are new, except the maps of a given `body`."""
+    """Return the state before the first step. `body` is the memory of the body, if it exists already. All other maps of
+    the state are new."""
     parts = parts_of(scene)
     given = {} if body is None else {"material": body}
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))

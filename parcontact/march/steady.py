@@ -50,12 +50,12 @@ class Point:
     """A steady state of sliding, with its measures, errors and cost.
 
     The conditions of the state are `velocity` [m/s], mean `pressure` [Pa] and `temperature` [deg C], which is NaN if
-    none is given. `shift_factor` is the ratio of relaxation times to those at the reference temperature. `friction` is
-    the dissipated power divided by load and speed, plus the friction of an interface. `errors` is the error budget of
-    friction and area. `measures` includes friction by the slopes of the rigid surface, which differs from `friction` by
-    a mesh error. `operator_calls` are counted as applications on the finest grid. `dissipated` is the power [W] lost in
-    each branch. It is empty for a free box, whose wake continues outside of the box. `effects` maps sections of the job
-    to the results of their effects.
+    none is given. `shift_factor` is the ratio of relaxation times at this temperature to relaxation times at the
+    reference temperature. `friction` is the dissipated power divided by load and speed, plus the friction of an
+    interface. `errors` is the error budget of friction and area. `measures` includes friction by the slopes of the
+    rigid surface, which differs from `friction` by a mesh error. `operator_calls` are counted as applications on the
+    finest grid. `dissipated` is the power [W] lost in each branch. It is empty for a free box, whose wake continues
+    outside of the box. `effects` maps sections of the job to the results of their effects.
     """
 
     velocity: Vector
