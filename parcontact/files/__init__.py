@@ -1,1 +1,1 @@
-"""This room has the output directories, and the runs of jobs that write their results into them."""
+"""This room has the output directories, and the runs of jobs that write their results into these directories."""

@@ -197,7 +197,7 @@ def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> i
 
 
 def find_regions(file: h5py.File) -> list[tuple[int, int]]:
-    """Return the byte ranges of the maps in a file in order, with adjacent ranges merged."""
+    """Return the byte ranges of the maps in a file, in the order of the file. Adjacent ranges are merged."""
     maps = [item for item in _datasets(file).values() if item.ndim > 1]
     places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
     merged: list[tuple[int, int]] = []

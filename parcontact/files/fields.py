@@ -1,5 +1,8 @@
-"""Growing files of maps: fields.h5 over time, with fields.xdmf by which ParaView reads it; steady.h5 over the points of
-a friction curve."""
+"""Growing files of maps.
+
+The file fields.h5 has the maps of a run over time; ParaView reads it by fields.xdmf. The file steady.h5 has the maps of
+the points of a friction curve.
+"""
 
 import time as clock
 from collections.abc import Mapping, Sequence
@@ -181,7 +184,7 @@ class FieldsFile(GrowingMaps):
         self._kept: frozenset[int] = frozenset()
 
     def make(self, provenance: Provenance) -> None:
-        """Create the file; an existing file is replaced."""
+        """Create the file. An existing file is replaced."""
         self.provenance = provenance
         self._replace(None)
 

@@ -1,8 +1,8 @@
 """Output directories: the files that each verb writes there, the marker by which they are recognised, and the lock.
 
-The marker of a directory has a claim for each verb that wrote it, with its job and the id of its run. Only files that
-the marker or a sealed checkpoint identifies are replaced; others are refused or renamed. A run takes the lock first.
-Then it checks the ownership of the directory, and only then it writes files.
+The marker of a directory has a claim for each verb that wrote into the directory. A claim has the job of the verb, and
+the id of its run. Only files that the marker or a sealed checkpoint identifies are replaced; other files are refused or
+renamed. A run takes the lock first. Then it checks the ownership of the directory, and only then it writes files.
 """
 
 import errno

@@ -1,8 +1,9 @@
-"""Run of a job in bands with a history, in its output directory: marches in rounds, then all rows at once.
+"""Runs of jobs in bands with a history, in their output directories.
 
-A march is the calculation of one band, step by step, through the history. Rows exist when the coarsest band is done.
-Until then finished marches are stored in a file (`bands.cascade.ContactStore`), so that a stopped or killed run goes on
-with the next march. `--until T` ends the history at T; a longer history needs new marches.
+A march is the calculation of one band, step by step, through the history. Marches are made in rounds. The rows of the
+run exist when the coarsest band is done, and are then written at once. Until then finished marches are stored in a file
+(`bands.cascade.ContactStore`), so that a stopped or killed run goes on with the next march. `--until T` ends the
+history at T; a longer history needs new marches.
 """
 
 import time

@@ -81,7 +81,8 @@ class Options:
 
     `until` is the time in the history [s] at which the run ends, None for the end of the history. `wall` is the limit
     of the time since the start of the program [s], None without a limit. `sweep_stop_file` stops all cases of a sweep,
-    and no case removes it. Warnings for which `shows` is False go into run.log only.
+    and no case removes it. `shows` returns True for a warning that is to be printed; other warnings go into run.log
+    only.
     """
 
     quiet: bool = False

@@ -164,14 +164,14 @@ def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
 
 
 def cells_per_wave(accuracy: float) -> int:
-    """Return the cells per shortest wave along the sliding direction that keep the relative error of friction below
-    `accuracy`."""
+    """Return the number of cells per shortest wave along the sliding direction that keeps the relative error of
+    friction below `accuracy`."""
     return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME_LENGTH)))
 
 
 def cells_for_area(accuracy: float) -> float:
-    """Return the cells per shortest wave along the sliding direction that keep the relative error of the contact area
-    below `accuracy`."""
+    """Return the number of cells per shortest wave along the sliding direction that keeps the relative error of the
+    contact area below `accuracy`."""
     return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
 
 

@@ -66,7 +66,7 @@ Boundary = Literal["periodic", "free"] | tuple[Literal["periodic"], Literal["fre
 
 
 class Grid(Part):
-    """The box and its cells; x comes first in `points` and `size`."""
+    """The box and its cells. In `points` and `size`, x comes first."""
 
     points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE, AUTO] = Field(
         description="a positive whole number of points"
@@ -201,7 +201,7 @@ def components_of(field: str) -> tuple[str, ...]:
 
 
 class Output(Part):
-    """Output files of a run; a relative directory starts at the working directory."""
+    """Output files of a run. The path of the directory may be relative to the working directory."""
 
     directory: Annotated[Path, AfterValidator(from_home)] = Field(
         default=Path("out"), description="the path of a directory (text)"
@@ -267,7 +267,7 @@ LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
 
 
 class Bands(Part):
-    """Bands of the spectrum of a surface; keys that are not given follow from `numerics.accuracy`."""
+    """Bands of the spectrum of a surface. Keys that are not given follow from `numerics.accuracy`."""
 
     count: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="a whole number of bands from 1 to 100"

@@ -138,7 +138,7 @@ no_field = {name: partial(_refuse_field, name) for name in FIELDS_NEED}  # check
 
 
 def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Yield an error for rolling in a job without `interface`; the effect `interface` lifts this rule."""
+    """Yield an error for rolling, unless an effect of the job lifts this rule."""
     for index, stage in enumerate(history):
         if stage is not None and stage.rolls:
             sentence = "needs interface: {stick: true}: without it all that touches slides"
@@ -162,7 +162,7 @@ def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
 
 
 def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Yield an error for a tensile load; the effect `adhesion` lifts this rule."""
+    """Yield an error for a tensile load, unless an effect of the job lifts this rule."""
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
@@ -288,7 +288,7 @@ def refuse_steady(section: str) -> Rule:
 
 
 def refuse_bands_over_time(section: str) -> Rule:
-    """Return the rule that a job with the `section` cannot march bands through a history."""
+    """Return the rule that a job with the `section` cannot have both bands and a history."""
 
     def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         if given is not None and bands is not None and history:

@@ -140,7 +140,7 @@ def listed_line(part: Part) -> str:
 
 
 def text(value: Any) -> str:
-    """Return a value as text, with numbers in six digits."""
+    """Return a value as text. Numbers have six digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

@@ -401,8 +401,8 @@ def _steady_start(state: str, velocity: tuple[float, float], pressure: float | N
 
 
 class Initial(Part):
-    """The state of the body at time 0: undeformed, or in steady sliding under a pressure. With a velocity of zero a
-    steady state is a contact that is fully relaxed."""
+    """The state of the body at time 0: undeformed, or in steady sliding under a pressure. Steady sliding at a velocity
+    of zero is a contact that has relaxed completely."""
 
     state: Literal["virgin", "steady"] = "virgin"
     velocity: Velocity = (0.0, 0.0)
