@@ -98,22 +98,14 @@ class ContactStore:
         return ""
 
     def _append(self, found: dict[str, Rung]) -> None:
-        lines = [json.dumps([digest, _plain(rung)]) for digest, rung in found.items()]
+        lines = [
+            json.dumps([digest, asdict(rung)], default=lambda value: value.tolist()) for digest, rung in found.items()
+        ]
         with self._path.open("a") as file:
             file.write("".join([*([FIRST_LINE] if not file.tell() else []), *(f"{line}\n" for line in lines)]))
 
     def _on_root(self, act: Callable[[], Any]) -> Any:
         return hdf5.write_on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
-
-
-def _plain(rung: Rung) -> dict[str, Any]:
-    values = asdict(rung)
-    found = values.pop("found")
-    return {**_lists(values), "found": _lists(found)}
-
-
-def _lists(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: np.asarray(value).tolist() for name, value in values.items()}
 
 
 def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:

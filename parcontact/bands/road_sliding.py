@@ -341,17 +341,13 @@ class RoadSliding:
         of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:3]
         shares = [result.errors[4:] / (result.contact_area_corrected or 1.0) for result in outcome.results]
         of_area = outcome.results[-1].errors[3], *(np.sum(shares, axis=0) * area)
-        method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
+        wholes = friction or 1.0, area or 1.0
+        by_samples = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
             ErrorParts(
-                solver / whole,
-                steps / whole,
-                0.0,
-                mesh / whole,
-                method=method[k] / whole + lost,
-                scatter=scatter[k] / whole,
+                solver / whole, steps / whole, 0.0, mesh / whole, method=by / whole + lost, scatter=spread / whole
             )
-            for k, (whole, (solver, steps, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
+            for whole, (solver, steps, mesh), by, spread in zip(wholes, (of_bands, of_area), *by_samples, strict=True)
         ]
         own = 1.0 - outcome.friction / friction if friction > 0.0 else 0.0  # share of the interface
         with_interface = parts[0]._replace(method=parts[0].method + own * parts[1].method)
