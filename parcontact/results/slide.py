@@ -122,10 +122,11 @@ def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
     return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
 
 
-def lacks_load(columns: Mapping[str, Sequence[float]]) -> bool:
+def lacks_load(columns: Mapping[str, Array]) -> bool:
     """Return True if friction is not defined in a row of a slide, for want of a load that presses."""
     slid = np.flatnonzero(np.diff(columns["distance"], prepend=0.0) > 0.0)
-    return _without_load(columns, np.array([0, *slid])).size > 0
+    listed = {name: values.tolist() for name, values in columns.items()}
+    return _without_load(listed, np.array([0, *slid])).size > 0
 
 
 def balanced(pressure: ArrayLike, highest: ArrayLike) -> Array:
