@@ -345,7 +345,11 @@ _OF_BANDS: Table = (
     Column("long_wavelength", "m", "longest wave of the band"),
     Column("short_wavelength", "m", "shortest wave of the band"),
     Column("friction", "", "of the waves of the band; the finest band includes the friction of an `interface`"),
-    Column("contact_area", "", "share in contact with the waves of this and all coarser bands"),
+    Column(
+        *("contact_area", ""),
+        "share in which this and all coarser bands touch the finer waves, which act as a soft layer; larger than "
+        "the contact area of a surface without the finer waves",
+    ),
     Column("rms_slope", "", "of the waves of the band"),
     Column("load_lost", "", "share of the load at pressures above the highest one solved for the band"),
     Column("rms_slope_to", "", "of this and all coarser bands"),

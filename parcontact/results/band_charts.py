@@ -174,13 +174,14 @@ def _over_bands(
         tables.append(some | {"x": longest / some["short_wavelength"] if y is AREA else some["short_wavelength"]})
     series = list(_make_lines(tables[0], "x", name, by))
     for thin in tables[1:]:
-        series += _make_thin(thin, "x", name, by, "theory", tables[0])
+        series += _make_thin(thin, "x", name, by, ALONE, tables[0])
     return Panel(key, x, y, series, log_x=True)
 
 
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
 COLD = "friction_cold"  # friction without feedback from heat
-THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
+ALONE = "theory without finer waves"  # area of waves up to a magnification; bands also touch finer waves
+THIN = {"theory": ":", ALONE: ":", "without feedback": "--"}  # dashes of thin lines, next to the simulation
 
 
 def find_differing(directories: Sequence[Path]) -> list[str]:

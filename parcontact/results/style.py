@@ -20,6 +20,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
+from matplotlib.container import BarContainer
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import (
     FixedFormatter,
@@ -216,10 +217,11 @@ def _width(figure: Figure | SubFigure) -> float:
 
 
 def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
-    """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
-    cell = axes.get_subplotspec()
+    """Add the legend of a panel, below it where bars fill the panel; return the height that it needs there [inch]."""
+    cell, bars = axes.get_subplotspec(), any(isinstance(one, BarContainer) for one in axes.containers)
     width = _width(axes.figure) / (cell.get_gridspec().ncols if cell else 1)
-    if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
+    few = len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width
+    if few and not bars:
         axes.legend(entries.values(), entries)
         return 0.0
     under = axes.transAxes + ScaledTranslation(0.0, -UNDER_AXES, axes.figure.dpi_scale_trans)

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from parcontact.results import band_charts
+from parcontact.results import band_charts, style
 from parcontact.results.panels import draw
 from plotting.many import write_curve
 
@@ -59,7 +59,7 @@ def test_theory_is_drawn_at_its_temperature(tmp_path: Path, temperature: float, 
         assert entry.name == "theory"
         assert [line.look["color"] for line in theory] == [(cold, warm)[temperature > 0.0].look["color"]]
     assert sum(line.name == "theory" for line in panels["bands"].series) == bars
-    assert sum(line.name == "theory" for line in panels["bands area"].series) == bars
+    assert sum(line.name == band_charts.ALONE for line in panels["bands area"].series) == bars
 
 
 def test_no_heat_no_temperatures(tmp_path: Path) -> None:
@@ -67,3 +67,16 @@ def test_no_heat_no_temperatures(tmp_path: Path) -> None:
     assert [chart.key for chart in band_charts.panels_of_bands(tmp_path)] == ["bands", "bands area"]
     (tmp_path / "bands.csv").unlink()
     assert band_charts.panels_of_bands(tmp_path) == []
+
+
+@pytest.mark.parametrize("bars", [False, True])
+def test_no_legend_lies_on_bars(bars: bool) -> None:
+    """Bars fill their panel up to its top, lines seldom do."""
+    axes = Figure().add_subplot()
+    axes.plot([0.0, 1.0], [0.0, 1.0], label="theory")
+    if bars:
+        axes.bar([0.0, 1.0], [1.0, 1.0])
+    (below,) = style.place_legends([[axes]])
+    top = axes.get_legend().get_window_extent().y1
+    assert (below > 0.0) == bars
+    assert (top < axes.bbox.y0) == bars
