@@ -207,7 +207,9 @@ class Run:
         if self.slab.root and (slides or self.march.scene.law is not None) and not self.stop:
             with suppress(OSError, InputError):  # an unreadable table does not end a run
                 run = Results(self.directory.path, "run", self.job, self.march.detached)
-                sentences = list(slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, run.table))
+                history, grid = self.job.history, self.job.grid
+                about = slide.describe_slide(history, self.job.initial, grid.dx, run.table, run.free_area)
+                sentences = list(about)
                 for said in answers("results", "said_at_end"):
                     sentences += said(run)
                 for text in sentences:

@@ -170,7 +170,7 @@ def _run(found: Results) -> Iterator[str]:
 def describe_run_in_words(run: Results) -> Iterator[str]:
     """Yield sentences on the slide and the cycles of a run, and the sentences of the effects of its job."""
     if (job := run.job) is not None:
-        yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
+        yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table, run.free_area)
         yield from slide.describe_cycles(job, slide.find_cycles(job, run.table))
     for sentences in answers("results", "sentences"):
         yield from sentences(run)

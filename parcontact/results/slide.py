@@ -216,12 +216,17 @@ def mean_of_slide(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
 
 
 def describe_slide(
-    history: Sequence[Stage], initial: Initial, cell: float, columns: Mapping[str, Sequence[float]]
+    history: Sequence[Stage],
+    initial: Initial,
+    cell: float,
+    columns: Mapping[str, Sequence[float]],
+    free_area: float = 0.0,
 ) -> Iterator[str]:
     """Yield sentences on the slide so far, from columns of the run; no sentence before something slides.
 
-    `cell` is the spacing of the grid along x [m]. If a history has several slides and the last one has not begun, the
-    sentences describe the slide before it.
+    `cell` is the spacing of the grid along x [m]. Contact areas are in m² in a free box of `free_area` [m²], otherwise
+    shares of the nominal area. If a history has several slides and the last one has not begun, the sentences describe
+    the slide before it.
     """
     last, starts = _slide(history), np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
     begun = int(np.count_nonzero(starts < columns["time"][-1] * (1.0 - SAME_INSTANT))) if columns["time"] else 0
@@ -245,9 +250,11 @@ def describe_slide(
         return
     defined = found.mu_dyn == found.mu_dyn
     yield from _describe_friction(found, cell, columns, rows) if defined else _describe_force(columns, rows)
-    area = f"{found.contact_area:.4g} by counting points"
+    size, unit = (free_area, "m²") if free_area else (1.0, "")
+    area = f"{quantity(found.contact_area * size, unit, 4)} by counting points"
     if CORRECTED in columns:
-        area = f"{with_error(*mean_of_slide(columns, rows, CORRECTED))} corrected for its edges, and {area}"
+        mean, error = mean_of_slide(columns, rows, CORRECTED)
+        area = f"{with_error(mean * size, error * size, unit)} corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
     for said_of in answers("results", "said_of_slide"):
         yield from said_of(columns, rows)

@@ -20,12 +20,14 @@ def stages(*data: dict[str, Any]) -> list[Stage]:
     return [Stage.model_validate(one) for one in data]
 
 
-def said(history: list[dict[str, Any]], table: dict[str, list[float]], cell: float = 0.1, **more: Any) -> list[str]:
+def said(
+    history: list[dict[str, Any]], table: dict[str, list[float]], cell: float = 0.1, free_area: float = 0.0, **more: Any
+) -> list[str]:
     """The sentences about the slide of a job with such a history, on cells of a given number of metres."""
     data = {"grid": {"points": 8, "size": 8 * cell}, "surface": {"shape": "wave", "amplitude": 1e-9, "waves": [1, 1]}}
     material = {"model": "elastic", "shear_modulus": 1e6}
     job = Job.model_validate({**data, "material": material, "history": history, **more})
-    return list(describe_slide(job.history, job.initial, job.grid.dx, table))
+    return list(describe_slide(job.history, job.initial, job.grid.dx, table, free_area))
 
 
 def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:
@@ -190,5 +192,7 @@ def test_the_area_whose_error_is_stated_and_friction_that_is_all_error() -> None
     stated = said([CLIMB], table)
     area = "the mean contact area over the same distance is 0.3133 corrected for its edges, "
     assert f"{area}and 0.3917 by counting points" in stated
+    in_free_box = f"{area.replace('0.3133', '1.253 mm²')}and 1.567 mm² by counting points"
+    assert in_free_box in said([CLIMB], table, free_area=4e-6)
     assert "largest estimated errors of single steps of the slide: friction unknown" in stated
     assert stated[-1] == "in some steps of the slide friction is smaller than its estimated error"
