@@ -239,10 +239,11 @@ MAP_SIZE = (4.2, 3.5)  # size of the picture of a map [inch]
 def describe_run(directory: Path) -> ReportSection:
     """Return the section on a run: histories, extreme and last values, and maps at saved instants."""
     run = PlottedRun(directory)
-    columns = run.table
+    axis, area = plotted_run.to_contact_area(run.columns["contact_area_corrected"], run.area * run.free)
+    columns, units = {**run.table, "contact_area": area.tolist()}, {**UNITS, "contact_area": axis.unit}
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
-        (name.replace("_", " "), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
+        (name.replace("_", " "), *map(format_cell, (values[-1], min(values), max(values))), units.get(name, ""))
         for name, values in known.items()
         if values and (run.job.directions or not name.startswith("friction"))
     ]

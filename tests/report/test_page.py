@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
+from drawing import ELASTIC, LOADS, MAPS, SLIDE, SPHERE, WAVE, ZENER, ran
 from PIL import Image
 
 from parcontact import __main__, job
@@ -19,7 +19,7 @@ from parcontact.errors import InputError
 from parcontact.files.stopping import Options
 from parcontact.march import curve
 from parcontact.parallel.slab import Slab
-from parcontact.results import page
+from parcontact.results import page, report_sections
 
 pytestmark = pytest.mark.rendered
 
@@ -148,6 +148,15 @@ def test_the_errors_of_a_run_are_those_of_its_log_and_its_last_step(tmp_path: Pa
     section = page.describe_errors(columns, page.read_logs(tmp_path), slide, of_curve=False)
     assert section.sentences == [f"{said.format('1.25')}."]
     assert section.tables[0].rows == [("friction", "3 %", "1 %")]
+
+
+def test_the_area_in_a_free_box_has_a_unit(tmp_path: Path) -> None:
+    """Hertz's area, corrected for its edges: a share of the box would depend on the choice of the box."""
+    section = report_sections.describe_run(ran(tmp_path, SPHERE + ELASTIC + "history: [{force: 0.1}]\n"))
+    (row,) = (row for row in section.tables[0].rows if row[0] == "contact area")
+    area = np.pi * (3 * 0.1 * 1.0e-2 / (4 * 4.0e6)) ** (2 / 3)  # E* = 4 G of an incompressible body
+    assert float(row[1]) == pytest.approx(area, rel=0.03)
+    assert row[-1] == "m²"
 
 
 def test_a_seal(tmp_path: Path) -> None:
