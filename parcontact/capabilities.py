@@ -1,13 +1,15 @@
-"""Capabilities: each folder of `effects/` adds one to the program, and a deleted folder removes it.
+"""Capabilities: each folder of `effects/` adds one capability to the program, and a deleted folder removes this
+capability.
 
-The package of a folder may state `SECTION`, the section of a job that turns it on, `EFFECT`, the name of its class in
-`effect.py`, columns of tables, and panels of columns (`Column` and `ColumnPanel`, found by `stated`). Other rooms of
-the program call `offers` to find objects in the other modules of the folder, such as `results.py`, and so name no
-capability. `GIVES` and `USES` name quantities of a step that an effect computes for other effects, and that it needs
-from them: effects that give something act before those that use it. `MATERIAL = True` says that the section is a
-material, which may include a file, and `IN_SCENE = True` that all jobs of a directory must have the same section. A run
-cannot continue with other values of keys that change its completed steps. These are all keys of the section, or the
-keys that `CHANGES_STEPS` names. `STAGE_KEYS` are the keys that a section adds to stages.
+The package of a folder may state `SECTION`, the section of a job that turns the capability on, `EFFECT`, the name of
+its class in `effect.py`, columns of tables, and panels of columns (`Column` and `ColumnPanel`, found by `stated`).
+Other rooms of the program call `offers` to find objects in the other modules of the folder, such as `results.py`, and
+so name no capability. `GIVES` names quantities of a step that an effect computes for other effects, and `USES` names
+quantities that it needs from other effects. An effect that gives a quantity acts before the effects that use it.
+`MATERIAL = True` says that the section is a material, which may include a file, and `IN_SCENE = True` that all jobs of
+a directory must have the same section. A run cannot continue if keys that change its completed steps get other values.
+These keys are all keys of the section, or only the keys that `CHANGES_STEPS` names. `STAGE_KEYS` are the keys that a
+section adds to stages.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -74,8 +76,8 @@ def folders() -> tuple[ModuleType, ...]:
 
 
 def needs_of(thing: Any) -> tuple[Collection[str], Collection[str]]:
-    """Return two lists of names of quantities of a step, `GIVES` and `USES`: those that a capability (its package, or
-    its effect's class) gives to others, and those that it uses from others."""
+    """Return the names of quantities of a step that a capability gives to other capabilities, and the names of those
+    that it uses from others (`GIVES` and `USES` of its package, or of the class of its effect)."""
     return getattr(thing, "GIVES", ()), getattr(thing, "USES", ())
 
 
@@ -109,8 +111,8 @@ def stated(name: str) -> list[Any]:
 
 
 def offers(module: str, name: str, job: Any = None) -> list[Any]:
-    """Return the objects called `name` in the modules called `module` of all capabilities that have such a module, or
-    of those capabilities only whose sections a `job` has; other modules are not imported."""
+    """Return the objects called `name` in the modules called `module` of all capabilities that have such a module. If a
+    `job` is given, only capabilities whose sections the job has count, and other modules are not imported."""
     asked = (each for each in _with(module) if job is None or job.section(each.SECTION) is not None)
     made = (import_module(f"{each.__name__}.{module}") for each in asked)
     return [getattr(each, name) for each in made if hasattr(each, name)]

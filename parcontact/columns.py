@@ -79,8 +79,8 @@ def plain_unit(unit: str) -> str:
 
 
 def find_name(text: str) -> str:
-    """Return the one of NAMES that a text of a header stands for, such as E_stor for `E'`, `Storage modulus`, or both;
-    '' if there is none."""
+    """Return the name, one of NAMES, that a text of a header stands for, such as E_stor for `E'`, `Storage modulus`, or
+    both; '' if there is none."""
     text = re.sub(r"\s+", " ", text.strip(" ,:")).replace("″", "''").replace("′", "'").replace("’", "'")
     if text in NAMES or (name := _symbol(text)):
         return text if text in NAMES else name

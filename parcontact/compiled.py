@@ -3,8 +3,9 @@
 Sums may be reordered for SIMD instructions; NaN and infinity keep their meaning. Machine code is kept in a private
 directory, so that only the first run waits for the compiler; without such a directory every run compiles.
 
-Plans of transforms are kept in such a directory, too. Its files are executed or trusted unread, so that no other user
-may be able to write them: it has mode 0700 and lies in the user's cache directory, or there is none.
+Plans of transforms are kept in such a directory, too. Files in these directories are executed, or trusted without a
+check, so that no other user may be able to write there. Therefore both have the mode 0700 and lie in the user's cache
+directory, or are not made.
 """
 
 import gc

@@ -94,8 +94,8 @@ Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
 
 
 class SweepWarnings:
-    """Warnings of a sweep by subject. Subjects of the warnings `shown` before are not shown again. Others are shown
-    immediately if `at_once` is True, else at the end."""
+    """Warnings of a sweep by subject. Subjects of the warnings `shown` before are not shown again. Other subjects are
+    shown immediately if `at_once` is True, else at the end."""
 
     def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
         self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1

@@ -225,9 +225,10 @@ def read_named_columns(
 ) -> Table:
     """Return the columns of a table whose columns have names.
 
-    Columns with a name in `names` must hold numbers, and others are ignored. `enough` gets the names in a line, and
-    returns True if they make it a header. Columns with a name in `plain` need no unit. Raises InputError with file and
-    line; its message says that a file of the kind `expected`, with a header such as `example`, was expected.
+    Columns with a name in `names` must contain numbers. Other columns are ignored. `enough` takes the names in a line,
+    and returns True if a line with these names is a header. Columns with a name in `plain` need no unit. Raises
+    InputError with file and line; its message says that a file of the kind `expected`, with a header such as `example`,
+    was expected.
     """
     lines = _read_lines(path, expected)
     rows = [(number, text) for number, text in lines if COMMENT.sub("", text).strip(" \t,;")]

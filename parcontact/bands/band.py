@@ -6,14 +6,14 @@ f(p)/p is constant. A distribution P(p) is represented by `W_j = int P(p) p psi_
 
     int P(p) f(p) dp = sum_j W_j f(p_j),    sum_j W_j p_j = int P(p) p dp:
 
-the load is conserved. With psi_j linear in p the load would be conserved, too, but a concave f be underestimated.
+the load is conserved. With psi_j linear in p the load would be conserved, too, but a concave f would be underestimated.
 
 In a history each stage of the job becomes stages whose steps follow the cell and the waves of the band. After a change
-of velocity the steps of a slide grow from a small part of a cell to half a cell. Each later step is a slip of
-exactly half a cell, so that its solve starts from the pressures of two steps before, moved by a cell (`march.laws`).
-After a slip of SETTLED times its longest wave a band counts as steady, and makes no steps until the next stage: fine
-bands settle within micrometres. So a band's own history is shorter than the job's, and a step is placed by the number
-of the job's stage and by the time since this stage began.
+of velocity the steps of a slide grow from a small part of a cell to half a cell. Each later step is a slip of exactly
+half a cell, so that its solve starts from the pressures of two steps before, moved by a cell (`march.laws`). After a
+slip of SETTLED times its longest wave a band counts as steady, and makes no steps until the next stage: fine bands
+settle within micrometres. So a band's own history is shorter than the history of the job. The place of a step is given
+by the number of the job's stage and by the time since this stage began.
 """
 
 from __future__ import annotations
@@ -104,9 +104,9 @@ class Rung:
 
     `friction` [-] of the band's waves follows from the dissipated power, and `friction_slopes` from the pressures on
     slopes. Contact areas are shares of the nominal area. `Cascade.climb` adds the approach of finer bands to the
-    `approach` [m]. `weights` are those of the ladder of the next finer band, and `load_lost` is the share of the load
-    above the top of that ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects by name
-    (`Probe`).
+    `approach` [m]. `weights` are the weights of the rungs of the next finer band, and `load_lost` is the share of the
+    load above the highest of these rungs. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
+    by name (`Probe`).
     """
 
     pressure: float
@@ -181,7 +181,7 @@ class Band:
         self._velocity: Vector = (math.nan, math.nan)
 
     def set_temperature(self, temperature: float) -> None:
-        """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
+        """Set the temperature [deg C] of the material. Raises InputError if the material has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
     def set_factors(self, factors: Any) -> None:
@@ -218,8 +218,8 @@ class Band:
 
     def solve(self, pressure: float, law: Constraint, below: PressureLadder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa], with the distribution of the contact's pressures over
-        `below`, the ladder of the next finer band. `law` has the length [m] by which a pressure [Pa] closes the gap
-        that all finer bands leave. Raises RunError if no state is found."""
+        `below`, the ladder of the next finer band. `law` states by which length [m] a pressure [Pa] closes the gap that
+        all finer bands leave. Raises RunError if no state is found."""
         setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
         units = setup.units
         seen = contact.u, self.heights, contact.d, law.touches(contact.p)
@@ -249,8 +249,8 @@ class Band:
 
 
 def rung_errors(budget: ErrorBudget | None) -> Array:
-    """Return the relative errors of friction by solver, time steps and grid, and then those of area, shape (6,), from
-    the error budget of a contact."""
+    """Return the relative errors of friction by solver, time steps and grid, followed by the relative errors of area,
+    shape (6,), from the error budget of a contact."""
     both = (budget.friction, budget.area) if budget else (None, None)
     return np.array([(p.solver + p.folded, p.time, p.mesh) if p else (0.0, 0.0, 0.0) for p in both]).ravel()
 
@@ -307,7 +307,7 @@ class Place(NamedTuple):
 
 def parts_of_history(job: Job, grid: Grid, longest: float) -> list[tuple[Stage, int]]:
     """Return the stages into which the stages of the job are divided for a band with this grid and `longest` wave [m],
-    each with the number of the job's stage of which it is a part."""
+    each with the number of the job's stage to which it belongs."""
     found = list[tuple[Stage, int]]()
     for number, stage in enumerate(job.history):
         found += [(part, number) for part in _parts(job, stage, grid.dx, longest)]

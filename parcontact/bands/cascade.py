@@ -8,7 +8,8 @@ of the next coarser band. In the downward pass the distribution of pressure pass
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
 
 with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure within
-it, and the weights w_j of `ladder`. Contacts of one band are independent, so that ranks share them.
+band k under p_j, and the weights w_j of the rungs (`band.PressureLadder`). Contacts of one band are independent, so
+that ranks share them.
 
 Contacts of the present point of a friction curve are stored in a file. A run that was killed and is continued solves
 only the missing contacts of this point.
@@ -50,9 +51,9 @@ class ContactStore:
         self._known: dict[str, Rung] = {}
 
     def keep_in(self, directory: Path, job: Job, name: str = NAME) -> str:
-        """Read the contacts in a file of this directory, and store further ones there. Remove a file of another
-        program, and return a sentence on this on root, otherwise ''. Raises RunError if the file cannot be read or
-        written."""
+        """Read the contacts in a file of this directory, and store further ones there. If the file is of another
+        program, remove the file and return a sentence on this, on root; otherwise return ''. Raises RunError if the
+        file cannot be read or written."""
         self._path = directory / name
         return self._on_root(lambda: self._read(job)) or ""
 
@@ -131,11 +132,11 @@ class BandResult:
     """Result of one band under a distribution of pressure.
 
     `weights` are the weights W_j of the rungs, and `load` is the sum of W_j p_j [Pa]. `friction` is the force of the
-    band's waves over the whole load, from the dissipated power, and `friction_slopes` the same from the pressures on
-    slopes. Contact areas are shares of the nominal area, resolved down to the band's shortest wave. `load_lost` is the
-    share of the load above the ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
+    band's waves over the whole load, from the dissipated power, and `friction_slopes` is this ratio from the pressures
+    on slopes. Contact areas are shares of the nominal area, resolved down to the band's shortest wave. `load_lost` is
+    the share of the load above the ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
     (`band.Probe`), averaged over the ladder. `errors`, shape (6,), are the absolute errors of friction by solver, time
-    steps and grid, and then those of area.
+    steps and grid, followed by the errors of area.
     """
 
     weights: Array
@@ -250,8 +251,8 @@ class Cascade:
 
     def closing_of(self, number: int, approaches: Sequence[float] | Array) -> tuple[InterfaceLaw, float]:
         """Return the closing c(p) of a band and all finer bands, from the approaches [m] of the band's rungs, and the
-        approach where c is 0. An approach below that of a lower pressure, which the solver's residual causes, is raised
-        to it first."""
+        approach where c is 0. The residual of the solver may make an approach smaller than the approach under a lower
+        pressure; such an approach is first raised to the larger one."""
         closings = np.maximum.accumulate(approaches)
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
@@ -305,7 +306,7 @@ class Cascade:
         return self.fall(solve)
 
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
-        """Return the contacts of the tasks in their order, from the store or else solved and then stored.
+        """Return the contacts of the tasks in their order. Contacts that are not in the store are solved and stored.
         Raises RunError on all ranks if a solve fails."""
         laws = [tuple(np.asarray(value).tobytes() for value in vars(task.law).values()) for task in tasks]
         here = self.velocity, self.pressure, self._temperatures, self._factors and self._factors[1]

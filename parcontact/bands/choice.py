@@ -7,8 +7,8 @@ of the waves between two wavenumbers are
 
 If the surfaces are profiles, the integrals have one factor k less.
 
-A surface from a spectrum is Gaussian, and the long waves of a real road are not. A measured map describes them: if the
-surface of a job starts with a map, the coarsest band is the map itself, without finer waves.
+A surface from a spectrum is Gaussian, but the long waves of a real road are not. A measured map describes these waves:
+if the surface of a job starts with a map, the coarsest band is the map itself, without finer waves.
 """
 
 import math
@@ -75,8 +75,8 @@ class WaveSpectrum:
         return np.geomspace(*self.ends, count + 1)
 
     def steep_beyond(self, slope: float) -> float:
-        """Return the wavelength [m] such that the longer waves together have this rms slope; 0 if the whole spectrum
-        has less."""
+        """Return the wavelength [m] such that the longer waves together have this rms slope; 0 if the rms slope of the
+        whole spectrum is smaller."""
         edges = self.cut(POINTS)
         middle, step = np.sqrt(edges[1:] * edges[:-1]), np.log(edges[1] / edges[0])
         squares = np.cumsum(self.phi(middle) * middle ** (4 - self.line)) * step / (2.0 * np.pi)

@@ -6,8 +6,8 @@ over the bands at each instant as in steady sliding (`cascade`, `road_sliding`).
 the rungs are marched without the closing of finer bands, too.
 
 The nominal pressure is constant, and rungs keep their pressures. But the mean pressure on a fine band rises when the
-rubber stiffens, as smaller contacts carry the load. A rung of higher pressure then has a larger weight. It was
-marched under this pressure from the start, when the pressure on the rubber was lower, so that it has a wrong memory of
+rubber stiffens, as smaller contacts carry the load. A rung of higher pressure then has a larger weight. Such a rung was
+marched under its pressure from the start, when the pressure on the rubber was lower, so that it has a wrong memory of
 the start. This error is a part of the error of the method (`RoadHistory._error_by_memory`).
 """
 

@@ -42,10 +42,10 @@ class BandOutcome:
     """Results of all bands.
 
     `results` are the mean results of all samples, with the closing of finer bands. `with_laws` has friction and
-    corrected area of the first sample with this closing, and `hard` has both without it. `scatter` has the standard
-    errors of friction and area, from the differences between surfaces. `rungs` has the rungs of each band, averaged
-    over samples. `line` is True if the surfaces are profiles. `memory` is the error of friction because rungs keep
-    their pressures through a history."""
+    corrected area of the first sample with this closing, and `hard` has both without this closing. `scatter` has the
+    standard errors of friction and area, from the differences between surfaces. `rungs` has the rungs of each band,
+    averaged over samples. `line` is True if the surfaces are profiles. `memory` is the error of friction because rungs
+    keep their pressures through a history."""
 
     results: Results
     with_laws: tuple[float, float]

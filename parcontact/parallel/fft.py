@@ -14,17 +14,17 @@ rows of x-wavenumbers begin at cache lines.
 
 By the transpose a rank gives away its rows of other ranks' x-wavenumbers, and gets all rows of its own x-wavenumbers.
 It is made in legs, each with some rows of every rank, so that messages never take more than a part of a map. A leg is
-sent before the next one is packed. To do both at the same time would take a second buffer.
+sent before the next leg is packed, as doing both at the same time would need a second buffer.
 
 Spectra are stored without loss as maps, so that files of maps hold them for any number of ranks. The half spectrum of a
 map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by columns. Its real parts fill as
 many columns of a map, its imaginary parts the rest. The imaginary parts of the first column and, if nx is even, of the
-last column do not fit: a second map holds them, for as many spectra as `per_map` says.
+last column do not fit: a second map holds these parts, for several spectra at once (`per_map`).
 
 The cosine series of a map is that of the map mirrored at its edges; its product with a symbol is a convolution of the
 mirrored map. The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of
 the size of the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the
-even points first, followed by the odd ones backwards, and V the transform of these n points,
+even points first, followed by the odd points in reverse order, and V the transform of these n points,
 
     C(k) = exp(-i theta) V(k) + exp(i theta) V(n - k),        theta = pi k/(2 n),
     V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
@@ -110,7 +110,7 @@ class Leg:
             parcel[...] = part
 
     def to_columns(self) -> None:
-        """Send the messages, and put those of other ranks into the spectrum; collective."""
+        """Send the messages, and put the messages of other ranks into the spectrum; collective."""
         self._comm.Alltoallv(self._in_rows, self._in_columns)
 
     def to_rows(self) -> None:
@@ -174,13 +174,14 @@ def _column_blocks(count: int, column_bytes: int) -> list[slice]:
 
 
 class FFT:
-    """Transforms of one size and their buffers.
+    """Transforms of one size and their buffers. The constructor and the methods are collective.
 
-    Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
-    `dtype`, float64 or float32, of calculations and messages, for maps of either type; `measured`, True if FFTW
-    measures which algorithm is fastest, False if it estimates, reproducibly; `sharing`, a transform of the same lengths
-    in double precision, whose memory this transform in single precision uses. The constructor and the methods are
-    collective.
+    * `slab`: the slab of the maps;
+    * `lengths`: the lengths (mx, my) of the transforms, at least (nx, ny), which is the default;
+    * `dtype`: float64 or float32, the precision of calculations and messages; maps may have either precision;
+    * `measured`: True if FFTW measures which algorithm is fastest, False if it estimates this, reproducibly;
+    * `sharing`: a transform of the same lengths in double precision, whose memory this transform in single precision
+      uses.
     """
 
     def __init__(
@@ -464,8 +465,8 @@ CosineWaves = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 class Cosines:
-    """Cosine series of maps of the size of a transform `fft`, in its precision. They use the memory of its spectrum,
-    and add a narrow block of columns. The constructor and the methods are collective."""
+    """Cosine series of maps of the size of a transform `fft`, in its precision. The series use the memory of the
+    spectrum of `fft`, and need a further narrow block of columns. The constructor and the methods are collective."""
 
     def __init__(self, fft: FFT) -> None:
         self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my

@@ -6,8 +6,8 @@ transferred between a grid and a coarser grid whose cells consist of whole fine 
 
 A pyramid is a sequence of grids down to a single cell; each cell joins two by two cells of the grid before. The first
 grids may join cells in pairs instead, along x or along y. Where the number of cells is odd, the last cell of the next
-grid is smaller. A cell belongs to the rank that has its last row in the grid before. Once there are few cells, every
-rank has all of them, as a slab of its own, which needs no further messages.
+grid is smaller. A cell belongs to the rank that has its last row in the grid before. When a grid has few cells, every
+rank gets the whole grid as a slab of its own, so that no further messages are needed.
 """
 
 from collections.abc import Callable, Iterator
@@ -62,8 +62,8 @@ class RowExchange:
 
     @staticmethod
     def of_parts(slab: Slab, wanted: NDArray[np.integer]) -> "RowExchange":
-        """Return the exchange of consecutive rows: `wanted`, shape (ranks, 2), has each rank's first row and the one
-        after its last."""
+        """Return the exchange of consecutive rows: `wanted`, shape (ranks, 2), has each rank's first row and the row
+        after its last row."""
         start, stop = wanted[slab.comm.rank].tolist()
         leaving = _overlaps(wanted, slab.rows.start, slab.rows.stop)
         return RowExchange(slab, stop - start, leaving, _overlaps(slab.bounds, start, stop), True)

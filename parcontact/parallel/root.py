@@ -4,8 +4,8 @@
 * Signals to stop or save, stored until all ranks have agreed.
 * Ranks wait for each other before a collective call, so that no rank hangs if another rank makes another call, or has
   ended. Every rank sends a checksum of 16 bytes of its next call to the others, and waits until all have done so. A
-  rank that ends continues to answer the others until all have ended. If it ends with an exception while others wait for
-  it in the middle of a call, it aborts them all.
+  rank that ends continues to answer the others until all have ended. If a rank ends with an exception while others wait
+  for it in the middle of a call, it aborts all ranks.
 """
 
 from __future__ import annotations

@@ -214,8 +214,8 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus `alpha`; local to this rank. The docstring of the module has its effective heights.
-        The new step replaces any step that has begun from the same memory.
+        """Begin a step of modulus `alpha`; local to this rank. The module states its effective heights. The new step
+        replaces any step that has begun from the same memory.
 
         `growth` is dt divided by the length of the step before. `growth` is 0 after a jump and in the first step of a
         stage.
@@ -282,8 +282,8 @@ class ZenerBody:
         return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`. A branch without a map in
-        `saved` starts as `G_k u` if it was frozen, else as 0."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`. A branch without a
+        map in `saved` starts as `G_k u` if it was frozen, else as 0."""
         for k, branch in zip(self.kept, memory.branches, strict=True):
             if f"branch {k}" not in saved:
                 branch[...] = self.prony.moduli[k] * saved["frozen"][k] * surface_of(memory)
@@ -300,7 +300,7 @@ Body = ElasticBody | ZenerBody
 
 
 def remembers(body: Body) -> bool:
-    """Return True unless the body is an `ElasticBody`, which is the only one without memory."""
+    """Return True unless the body is an `ElasticBody`, the only body without memory."""
     return type(body) is not ElasticBody
 
 

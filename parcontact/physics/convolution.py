@@ -342,7 +342,7 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
 
 def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally: Tally) -> TileConvolution:
     """Return a preconditioner on tiles, from displacement to pressure. Its symbol is `|q|/(1 - nu)`. The coefficients
-    fall with the third power of the distance, and only those between adjacent tiles are kept. `tally` counts the
+    fall with the third power of the distance, and only coefficients between adjacent tiles are kept. `tally` counts the
     allocated memory and the operator calls."""
     length = 8 * SIDE
     qx, qy = (

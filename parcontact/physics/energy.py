@@ -117,7 +117,7 @@ class StepProducts(NamedTuple):
 
 def dissipation_weights(z: Array) -> StepProducts:
     """Return the weights of `StepProducts` in the energy that a branch dissipates in a step, which is the integral of
-    `<h, A^-1 h>/(G tau)` over the step. `z = dt/tau` has any shape, as have the weights."""
+    `<h, A^-1 h>/(G tau)` over the step. `z = dt/tau` has any shape, and the weights have the same shape."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     lost, q = -np.expm1(-safe), bend(safe)
@@ -192,7 +192,7 @@ class ElasticEnergy:
         return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies that a checkpoint holds; the work equals the stored energy."""
+        """Return the energies of a checkpoint. The work equals the stored energy."""
         stored = float(saved.get("stored", 0.0))
         return EnergyMemory(work=stored, stored=stored)
 
@@ -262,7 +262,7 @@ class ElasticPressure:
         return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> BodyMemory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`."""
         assert memory is not None
         return self.body.restored(memory, saved)
 
@@ -341,7 +341,7 @@ class ZenerEnergy:
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies that a checkpoint holds, whose maps have been read into `memory`."""
+        """Return the energies of a checkpoint. The saved maps have already been read into `memory`."""
         work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
         names = "dissipated", "branches", "crossed"
         dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)
@@ -394,8 +394,8 @@ class Probe:
         """Return the measures of the pressure `alpha p` with the gap `u - h - d`; collective.
 
         The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not 0
-        where the surfaces touch. Friction is 0 unless the load is compressive and above `least_load` [N], below which
-        the load is only the rounding error of two forces in balance. If no point touches, all pressure is tension, a
+        where the surfaces touch. Friction is 0 unless the load is compressive and above `least_load` [N]. A smaller
+        load is only the rounding error of two forces in balance. If no point touches, all pressure is tension. Then a
         load above 0 is only an error of the solve, and friction is 0, too.
         """
         units, points = self.units, self.slab.points

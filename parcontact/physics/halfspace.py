@@ -4,10 +4,11 @@ An elastic half space of shear modulus 1 under the pressure p moves by the Bouss
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
-Displacements of a body of modulus G are these divided by G. Lengths have any unit; the unit of displacements is this
-unit times pressure/modulus. The kernel `spectral` uses this symbol; the kernel `love` takes the pressure as constant on
-each cell, and the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to
-0. For another body, the symbol is multiplied by the ratio of its compliance to that of the half space (`Response`).
+Displacements of a body of modulus G are these displacements divided by G. Lengths have any unit; the unit of
+displacements is this unit times pressure/modulus. The kernel `spectral` uses this symbol; the kernel `love` takes the
+pressure as constant on each cell, and the displacement at cell centres. The mean displacement of a periodic half space
+is arbitrary and set to 0. For another body, the symbol is multiplied by the ratio of its compliance to that of the half
+space (`Response`).
 
 A pressure wave `exp(i q x)` that moves with the surface at the velocity vector v loads a point of a viscoelastic
 body at the angular frequency `-q v`. In the frame of the surface,
@@ -368,10 +369,10 @@ class HalfSpace:
 
     The box is periodic, with the `kernel`, unless it is `free`. Nothing surrounds a free box, and the coefficients are
     Love's; a free box that `repeats_along_x` is periodic along x only. `other` is the response of a body that is no
-    half space. `factors` is None for a linear body, or a function of wavenumbers that returns two factors for each, on
-    the storage and on the loss modulus in steady sliding. The argument `fft` of methods is the transform of maps:
-    operators compute in its precision, and symbols have the shape of its spectrum, or of the requested `rows`. A free
-    half space makes a padded transform for each operator.
+    half space. `factors` is None for a linear body, or a function that returns two factors for each wavenumber: on the
+    storage and on the loss modulus in steady sliding. The argument `fft` of methods is the transform of maps: operators
+    compute in its precision, and symbols have the shape of its spectrum, or of the requested `rows`. A free half space
+    makes a padded transform for each operator.
     """
 
     size: Vector
@@ -436,9 +437,9 @@ class HalfSpace:
     def operator(self, fft: FFT) -> Convolution:
         """Return the operator from pressure to displacement; collective where the half space is free.
 
-        A free box is padded with zeros to twice its size, which makes the cyclic convolution with Love's coefficients a
-        linear one (paper, reference [12]). The coefficients are computed at the first use; the transforms are planned
-        at once.
+        A free box is padded with zeros to twice its size, so that the cyclic convolution with Love's coefficients
+        equals the linear convolution (paper, reference [12]). The coefficients are computed at the first use; the
+        transforms are planned at once.
         """
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
@@ -457,7 +458,7 @@ class HalfSpace:
     def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
         """Return the operator from displacement to pressure.
 
-        For the periodic half space with the spectral kernel the operator is exact, but not for the mean. Otherwise the
+        For the periodic half space with the spectral kernel the operator is exact except for the mean. Otherwise the
         operator is only approximate, for use as a preconditioner. In a free box displacements are continued mirrored at
         the edges, so that they have no jump there.
         """

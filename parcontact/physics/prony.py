@@ -214,8 +214,9 @@ def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
 
     The compliance follows by partial fractions of 1/Gbar, with Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j). Gbar
     is zero at s = -1/lambda_i, where J_i = -1/(s Gbar'(s)). One lambda_i lies between each relaxation time and the
-    next, and one above the last; the latter is infinite if G_inf = 0, and the body flows. Each zero is found by the
-    logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times are.
+    next, and one above the last relaxation time. If G_inf = 0, the last lambda_i is infinite, and the body flows. Each
+    zero is found by the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far
+    the times are.
     """
     series = normal_form(*material)
     spring, terms, times = series
@@ -323,8 +324,8 @@ def fit_exponentials(shortest: float, longest: float, error: float) -> Exponenti
 
 
 def shares_of_step(x: slab_Array) -> tuple[slab_Array, slab_Array]:
-    """Return the weights, divided by dt, of the heat before a step and of the heat after it, for heat linear in time.
-    `x` is the length dt of the step times the rate, any shape."""
+    """Return the weights, divided by dt, of the heat before and of the heat after a step, for heat linear in time. `x`
+    is the length dt of the step times the rate, any shape."""
     small = np.minimum(x, 1e-3)
     safe = np.maximum(x, 1e-3)
     mean = np.where(x < 1e-3, 1.0 - small / 2 + small**2 / 6 - small**3 / 24, -np.expm1(-safe) / safe)

@@ -149,8 +149,8 @@ class Entry:
     """A remembered quantity: a map (two-dimensional, the rows of this rank), or numbers. `unit` is the factor from
     `value` to SI units, and `symbol` is the name of the SI unit.
 
-    A checkpoint may lack an `optional` entry, which `restored` then replaces. A `given` entry follows from the job: its
-    value is not restored, and a checkpoint with another value is refused.
+    A checkpoint may lack an `optional` entry. Then the method `restored` of the part makes a value for this entry. A
+    `given` entry follows from the job: its value is not restored, and a checkpoint with another value is refused.
     """
 
     value: NDArray[Any] | float
@@ -172,7 +172,7 @@ class Entry:
 class RunPart(Protocol[Memory]):
     """A part of a run that has a memory from one step to the next.
 
-    The memory is a value: a step returns a new one. Two memories may share maps (`march.state`).
+    The memory is a value: a step returns a new memory. Two memories may share maps (`march.state`).
     """
 
     def at_rest(self) -> Memory:
@@ -182,8 +182,8 @@ class RunPart(Protocol[Memory]):
         """Return the checkpoint entries of a memory by the part's own names; maps are not copied."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory that a checkpoint holds, whose maps have been read into `memory`. Other entries of `saved`
-        are arrays of numbers in the run's units."""
+        """Return the memory of a checkpoint. The saved maps have already been read into `memory`. Other entries of
+        `saved` are arrays of numbers in the run's units."""
 
 
 def with_part(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:

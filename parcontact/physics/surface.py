@@ -447,9 +447,9 @@ def friction_by_energy(
     slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: tuple[bool, bool]
 ) -> float:
     """Return the coefficient of friction `-<p, du/ds>/<p, 1>`, where s is the coordinate along the unit vector
-    `direction`; collective. Heights u and lengths of `cell = (dx, dy)` may have two units; the unit of the result is
-    the unit of u divided by the unit of lengths. Beyond an edge where the box is not `cyclic`, u keeps its value at the
-    edge."""
+    `direction`; collective. Heights u and lengths of `cell = (dx, dy)` may have different units; the unit of the result
+    is the unit of u divided by the unit of lengths. Beyond an edge where the box is not `cyclic`, u keeps its value at
+    the edge."""
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
         nothing = np.empty((0, slab.nx), u.dtype)
@@ -540,7 +540,7 @@ class InterfaceFriction:
         return replace(self, shift=self.shift * factor)
 
     def force(self, area: float, velocity: Vector) -> Vector:
-        """See `Shear.force`."""
+        """Return the force [N]; see `Shear.force`."""
         speed = math.hypot(*velocity)
         size = self.stress(speed) * area / (speed or 1.0)
         return 0.0 - size * velocity[0], 0.0 - size * velocity[1]

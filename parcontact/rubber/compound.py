@@ -202,7 +202,7 @@ def fitted(
     `poisson` converts Young's moduli to shear moduli. `law` is the name of a shift law whose constants are fitted, wlf,
     arrhenius or free, or a shift with known constants. `vertical` is the law of the vertical factors b_T of moduli
     (`series.superpose`); it has no effect on a known shift with a vertical law of its own. `reference` [deg C] is the
-    reference temperature, by default the middle one of the measured temperatures. `error` is the accepted relative
+    reference temperature, by default the middle one of all measured temperatures. `error` is the accepted relative
     error of both moduli, and `weigh` names the moduli that are fitted. Raises InputError for a table that cannot be
     read, and for moduli that no series fits.
     """

@@ -10,10 +10,10 @@ behind a slash. The columns are:
 * D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
 A modulus that is named by words alone is taken as Young's modulus, but as the shear modulus if rates are in rad/s, as
-rheometers write them. A compliance that is named by words alone is taken as one of shear. The shear modulus and the
-compliance get a warning. Missing moduli follow from tan delta or the phase angle. Columns with other names are ignored.
-Rows of one temperature form a set. Without a column T all rows form one set. In a table of one frequency and many
-temperatures each row is a set.
+rheometers write them. A compliance that is named by words alone is taken as a compliance in shear. There is a warning
+if a modulus or a compliance is taken as one in shear. Missing moduli follow from tan delta or the phase angle. Columns
+with other names are ignored. Rows of one temperature form a set. Without a column T all rows form one set. In a table
+of one frequency and many temperatures each row is a set.
 
 Tables with values that no rubber has, such as moduli in a wrong unit, are refused before a fit.
 """
@@ -132,7 +132,7 @@ class Set:
 class Measurement:
     """All sets of a file in the order of their temperatures; `tension` is True if Young's moduli were converted.
 
-    `derived` names the modulus that the table does not have and that was computed from the other one and tan delta:
+    `derived` names the modulus that the table does not have and that was computed from the other modulus and tan delta:
     "stor", "loss", or "" for none. `doubts` are sentences about ambiguities and omissions.
     """
 

@@ -1,6 +1,6 @@
 """Fits of Prony series, and of shifts with temperature, to measured moduli.
 
-A Prony series has as few branches as give the loss modulus everywhere in the measured band:
+A Prony series gets as few branches as are needed for the loss modulus everywhere in the measured band:
 
     G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
     J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
@@ -13,8 +13,8 @@ J. Weese, Rheol. Acta 32 (1993) 65). The second fit yields the shortest series t
 everywhere in the band. For creep data the modulus is 1/J*(w) of the spectrum (J. D. Ferry, Viscoelastic Properties of
 Polymers (1980), chapter 3).
 
-By a shift with temperature, moduli measured at several temperatures form one curve. Its horizontal factors a_T, of
-rates, and its vertical factors b_T, of moduli, are fitted together:
+By a shift with temperature, moduli measured at several temperatures form one curve. The horizontal factors a_T, of
+rates, and the vertical factors b_T, of moduli, are fitted together:
 
     G*(w, T) = b_T G*(a_T w, T_ref)
 
@@ -64,11 +64,11 @@ class PronySeries:
     """A fitted Prony series: `modulus_inf` [Pa], `moduli` [Pa] and `times` [s], both of shape (n,), at the reference
     temperature.
 
-    `error` is the rms relative misfit of the fitted data, and `best` the smallest one of any series. `alone` are two
-    smallest misfits: if only the storage modulus is fitted, and if only the loss modulus is. `scatter` is the relative
-    scatter of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the range of
-    frequencies in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of the loss
-    modulus inside this range, at its lower end and at its upper end.
+    `error` is the rms relative misfit of the fitted data, and `best` is the smallest misfit of any series. `alone` has
+    two further smallest misfits: of fits to the storage modulus alone, and to the loss modulus alone. `scatter` is the
+    relative scatter of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the
+    range of frequencies in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of
+    the loss modulus inside this range, at its lower end and at its upper end.
     """
 
     modulus_inf: float
@@ -90,7 +90,7 @@ class PronySeries:
         return float(self.modulus(np.array([omega]))[0].real)
 
     def response(self, kind: Kind, at: Array) -> Array:
-        """Return the moduli [Pa] of the series as a kind of measurement has them.
+        """Return the moduli [Pa] of the series in the form of a kind of measurement.
 
         With frequencies `at` [rad/s], shape (n,), these are all storage moduli followed by all loss moduli, shape
         (2 n,). With times `at` [s] they are G(t) or 1/J(t), shape (n,).
@@ -166,7 +166,7 @@ class ReducedData:
 
     def columns(self, times: Array) -> Array:
         """Return the `kernel` of the fitted data, divided by the data. Multiplied with the weights of an exact fit it
-        is 1 for each of the data. For creep the kernel is one of J, and is divided by J = 1/`moduli`."""
+        is 1 for each of the data. For creep the kernel belongs to J, and is divided by J = 1/`moduli`."""
         found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
         return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
 

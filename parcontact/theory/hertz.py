@@ -94,8 +94,8 @@ def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius:
 
 
 def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
-    """Return the time [s] at which contact is lost if the approach rises and falls as in `triangle_force`. It solves
-    int_0^t G = 2 int_0^{t - rise_time} G, and does not depend on the sphere and the depth."""
+    """Return the time [s] at which contact is lost if the approach rises and falls as in `triangle_force`. This time t
+    solves int_0^t G = 2 int_0^{t - rise_time} G, and does not depend on the sphere and the depth."""
     series = normal_form(*material)
 
     def excess(t: float) -> float:

@@ -16,9 +16,9 @@ corrects the friction (1: no correction).
 Source: for steady sliding B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; for histories B. N. J. Persson and A. I.
 Volokitin, Phys. Rev. B 65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27
 (2015) 105102. Sec. 3.1 of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
-half-space" uses the theory and prints no formula of it. Steady sliding is computed here as published. In transients,
-this module takes M from full contact and P at the present time. A theory could also weight the past motion, on which M
-depends, with the P of that time; it would differ only in transients of partial contact.
+half-space" uses the theory, but does not print its formulas. Steady sliding is computed here as published. In
+transients, this module takes M from full contact and P at the present time. A theory could also weight the past motion,
+on which M depends, with the P of that time. Such a theory would differ only in transients of partial contact.
 
 Integrals are sums over waves in `Rings`. The argument `modulus` (M, Pa) has one entry per wave on its last axis, and
 `mean_pressure` (p0, Pa) has the shape of the other axes. All are in SI units.
@@ -197,8 +197,8 @@ def traction(mean_pressure: Values, rings: Rings, modulus: ComplexValues, gamma:
 def friction_coefficient(
     mean_pressure: Values, rings: Rings, vx: float, vy: float, modulus: ComplexValues, gamma: float = GAMMA
 ) -> Array:
-    """Return the friction coefficient mu of the surface with all its waves, which slides at the velocity (vx, vy)
-    [m/s], not 0."""
+    """Return the friction coefficient mu of the surface with all its waves. The surface slides at the velocity (vx, vy)
+    [m/s], which must not be 0."""
     along = traction(mean_pressure, rings, modulus, gamma) @ np.array([vx, vy])
     return np.asarray(-along / (np.hypot(vx, vy) * mean_pressure))
 
