@@ -1,5 +1,5 @@
-"""Adhesion: surfaces that attract each other. This module states the columns of tables for jobs with
-adhesion."""
+"""Adhesion: surfaces that attract each other. Columns of tables and panels for jobs with adhesion
+are stated here."""
 
 from ...capabilities import Axis, Column, ColumnPanel, Table
 

@@ -1,4 +1,4 @@
-"""Heat of sliding: temperatures of the rubber below the contact, and their columns in tables."""
+"""Heat of sliding: temperatures of the rubber below the contact, their columns in tables, and their panels."""
 
 import math
 from collections.abc import Callable

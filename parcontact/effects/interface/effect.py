@@ -150,9 +150,7 @@ class InterfaceEffect(Effect[Memory]):
     def remembers(job: Any) -> bool:
         return bool(job.section("interface").stick)
 
-    @staticmethod
-    def sheared_first(job: Any) -> bool:
-        return bool(job.section("interface").stick)
+    sheared_first = remembers
 
     @staticmethod
     def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:

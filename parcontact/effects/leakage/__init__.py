@@ -1,4 +1,4 @@
-"""Leakage through the gap of a contact, and its columns in tables."""
+"""Leakage through the gap of a contact, its columns in tables, and its panels."""
 
 from ...capabilities import COUNTED, Axis, Column, ColumnPanel, Table
 

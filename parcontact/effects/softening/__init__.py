@@ -1,4 +1,4 @@
-"""Strain softening of filled rubber in steady sliding (the Payne effect), and its columns in tables."""
+"""Strain softening of filled rubber in steady sliding (the Payne effect), its columns and its panel."""
 
 from ...capabilities import Axis, Column, ColumnPanel, Table
 
