@@ -30,7 +30,6 @@ from ...march.budget import PULL_OFF
 from ...march.time_error import Fit
 from ...printed import quantity, with_error
 from ...results.results import Results
-from .effect import law_of
 
 ZONE = Fit(
     "pull-off: times a power of the cell over the process zone",
@@ -144,6 +143,8 @@ def _pulls(run: Results) -> list[PullOff]:
     """Return the pull-offs of a run; none if its job has no adhesion."""
     if run.job is None or run.job.section("adhesion") is None:
         return []
+    from .effect import law_of  # slow to import, and for jobs with adhesion only
+
     law = law_of(run.job)
     return find(run.table, bool(run.detached), law.cell / law.zone if law.zone else math.nan)
 
