@@ -9,7 +9,7 @@ In a trial of a job some steps are made in memory, and all others are assumed to
 Each stage has an equal share of the time. When the share is used up, one long step leads to the end of the stage. The
 load may jump at the start of a stage: the cost of later steps is that of the tried steps without the first ones. If
 half of the time is over before a job has made enough steps, its steps are counted and timed on a quarter of the points
-along each side. The transforms that the job made on its own grid before then give the ratio of times of both grids.
+along each side. The transforms that the job has made on its own grid so far give the ratio of times of both grids.
 
 Times are processor times. They contain the waits of a rank for others, in which MPI is busy.
 """
@@ -67,8 +67,8 @@ NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energi
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
     """Return the memory of a rank in maps and transform buffers [bytes], by purpose.
 
-    The default is the last rank, whose maps are the largest. Its entry for the spectrum of the surface is the largest
-    of all ranks.
+    The default is the last rank, whose maps are the largest. But the entry for the spectrum of the surface is the
+    largest of all ranks.
     """
     slab = _slab(job, ranks, rank)
     scene = build_on(outline(job, slab))
@@ -277,8 +277,8 @@ class Trial:
     """Costs of a `job`, measured in a trial on `ranks` ranks, for each stage, or for all steady states as one stage.
 
     `points` are the points of the grid that was tried, and `building` is the time in which its scene was set up [s].
-    `price` is the time of a transform of N points divided by N log N, on the grid of the job over the tried grid; 1 if
-    they are the same.
+    `price` is a ratio of times of a transform of N points divided by N log N: on the grid of the job over the tried
+    grid. It is 1 if both grids are the same.
     """
 
     job: Job
@@ -298,7 +298,7 @@ class Trial:
 
     def total(self, name: str) -> float:
         """Return the cost `name` of all steps: `seconds`, or the name of a count in the tally. A step of an untried
-        stage has the mean cost of the others."""
+        stage has the mean cost of the other stages."""
         tried = [stage for stage in self.stages if stage.tried]
         steps = sum(stage.steps for stage in tried)
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
@@ -322,7 +322,8 @@ class Trial:
 
 
 def try_job(job: Job, slab: Slab, seconds: float) -> Trial | None:
-    """Return the costs of a job from a trial of about `seconds` [s]; None if the job is too large for it; collective.
+    """Return the costs of a job from a trial of about `seconds` [s]; None if the job is too large for a trial;
+    collective.
 
     Raises InputError for files that do not match the job.
     """
@@ -381,7 +382,7 @@ def _coarser(job: Job) -> Iterator[Job]:
 
 def warm_up(job: Job, slab: Slab) -> float:
     """Make the first steps, or steady states, of a scene of few points, so that later steps include no compilation.
-    Return the time of one of its operator calls [s]; collective."""
+    Return the time of an operator call of this scene [s]; collective."""
     small = _tiny(job)
     if small is None:
         return 0.0

@@ -3,7 +3,8 @@
 A plan lists the effects of a job and the memory of a rank. A trial gives the numbers of steps and their times.
 
 The first case of a sweep is planned in full. The last case and one in between are tried. The times of other cases
-follow from the nearest tried case in proportion to the work, which is steps (or steady states) times N log N.
+follow from the nearest tried case in proportion to the work: the number of steps (or steady states) times N log N for N
+points.
 """
 
 import math
@@ -140,7 +141,7 @@ KILO = 1024  # unit of resident memory in `getrusage` [bytes]
 @dataclass
 class Planner:
     """Plans jobs for each number of ranks in `ranks`, within about `seconds` [s] of processor time since the program
-    began, of which a trial gets at least half. `started` [s] is the time that the program took to start.
+    began. A trial gets at least half of this time. `started` [s] is the time that the program took to start.
 
     Trials are appended to `found`, and `overhead` is the time of an operator call on a few points [s].
     """
@@ -152,8 +153,8 @@ class Planner:
     overhead: float = 0.0
 
     def plan(self, job: Job, slab: Slab, trials: int = 1) -> Iterator[str]:
-        """Yield the lines of the plan of a job; collective: all ranks must exhaust the iterator. The time of the
-        planner is for a number of `trials`, of which this is the first."""
+        """Yield the lines of the plan of a job; collective: all ranks must exhaust the iterator. The planner divides
+        its time between several `trials`; this trial is the first of them."""
         yield from effects(job)
         parts = [job] * bool(job.history) + [only_steady_states(job)] * (job.steady is not None)
         for part in parts:
@@ -238,7 +239,7 @@ def _work(job: Job) -> float:
 def peak_memory() -> int:
     """Return the largest resident memory of this process so far [bytes].
 
-    The kernel's `VmHWM` begins with the program; `ru_maxrss`, for systems without it, also counts the process that
+    The kernel's `VmHWM` begins with the program; On systems without `VmHWM`, `ru_maxrss` also counts the process that
     started the program.
     """
     with suppress(OSError):

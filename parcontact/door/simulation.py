@@ -37,8 +37,8 @@ class Row(Mapping[str, float]):
     """Measures of an instant: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
 
     Energies [J] that the job does not request (`output.energy`) are NaN. `dict(row)` has all columns. Type checkers
-    know the columns of the page `outputs` as attributes. Columns of single branches, such as `row["dissipated_0"]`, and
-    those of effects of other packages have no attribute for them. A column that the job does not have raises
+    know the columns of the page `outputs` as attributes. Type checkers do not know columns of single branches, such as
+    `row["dissipated_0"]`, and columns of effects of other packages. A column that the job does not have raises
     AttributeError.
     """
 
@@ -149,7 +149,7 @@ class Simulation:
     # -- running ------------------------------------------------------------------------------------------------------
 
     def steps(self) -> Iterator[Row]:
-        """Yield the row of the initial state, then one after each step, which is made on demand in memory.
+        """Yield the row of the initial state, and then the row of each step. Each step is made on demand, in memory.
 
         A second call continues after the last step. Raises RunError for a failed step, and keeps the state before it.
         All ranks must make each step: if one rank leaves the loop by `break` or an exception, the others raise

@@ -4,8 +4,8 @@ A study runs all combinations of its meshes, cells per step and integrators. For
 mesh alone: all meshes then have the time steps of the finest mesh. A rough surface of one seed has the same waves on
 every mesh.
 
-Stages that choose their steps do so in every case, unless the study lists cells per step, which then hold in sliding
-stages.
+Stages that choose their steps do so in every case. But if the study lists cells per step, sliding stages have these
+steps.
 
 Richardson extrapolation gives the limit of values on finer and finer meshes, its order and its uncertainty.
 
@@ -14,8 +14,8 @@ For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio
 f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
 
 with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 if h3/h2
-differs from h2/h1). The uncertainty is the larger of two changes of the limit: if the order changes by DOUBT,
-and with four sizes, if the finest one is left out. It is at least LEAST_DOUBT of the last difference.
+differs from h2/h1). The uncertainty is the change of the limit if the order changes by DOUBT or, with four sizes, if
+the finest size is left out, whichever is larger. The uncertainty is at least LEAST_DOUBT of the last difference.
 
 Results of a study are limits, errors of all cases, the best settings, and sentences about them. A picture shows the
 errors against the refinement of mesh and time step (as Fig. 6 of the paper), and against the computing time.
@@ -229,7 +229,7 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     """Return the limit for size 0 of at least two values at decreasing sizes.
 
     If there are two values only, or values do not converge monotonically, the limit is the finest value. Its
-    uncertainty is then the larger of the last two differences, or the only difference; NaN if they are 0.
+    uncertainty is then the larger of the last two differences, or the only difference; NaN if the differences are 0.
     """
     last = abs(values[-1] - values[-2])
     order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
@@ -337,10 +337,12 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     """Return the reference of each quantity: a limit along mesh and time together, or along time alone if meshes are
-    not varied. Limits with an order come before others; among these the least uncertain one is taken.
+    not varied. If some limits have an order, the reference is the least uncertain of these limits, else the least
+    uncertain of all limits.
 
     Without such a refinement, or without differences, the reference is the most expensive case, with unknown error.
-    Errors that all cases have in common do not show in a limit, so that its uncertainty is at least `ladders.shared`.
+    Errors that all cases have in common do not show in a limit, so that the uncertainty of the reference is at least
+    `ladders.shared`.
     """
     found = [one for one in limits(ladders, outcomes) if one.ladder == TIME]
     if len(ladders.meshes) > 1:
@@ -500,8 +502,8 @@ class StudyCurve:
 def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
     """Draw `convergence.png` of a study and return its path; None if nothing is refined.
 
-    `doubts` has the relative uncertainty of the reference of each quantity. A grey band of the panel shows the errors
-    below it.
+    `doubts` has the relative uncertainty of the reference of each quantity. A grey band of the panel shows errors below
+    this uncertainty.
     """
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
     if not drawn:

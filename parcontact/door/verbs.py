@@ -97,8 +97,8 @@ def _refuse_surroundings() -> None:
 
 
 def root_alone(verb: Verb) -> Verb:
-    """Return a verb that only root executes. With several ranks MPI is started first on all of them, as an import on
-    root might start MPI there alone."""
+    """Return a verb that only root executes. With several ranks MPI is first started on all ranks, as an import on root
+    might start MPI on root alone."""
 
     @wraps(verb)
     def act(options: argparse.Namespace) -> int:

@@ -45,8 +45,8 @@ SAME = 1e-9  # rounding: of distances
 
 def panels_of_bands(directory: Path, differing: Collection[str] = ()) -> list[Panel]:
     """Return panels of the bands of a friction curve (bands.csv) at the first pressure and temperature in this table,
-    with the lines of the theory for the same pressure and temperature. Their axes name those of both that vary, or that
-    are `differing` among several curves."""
+    with the lines of the theory for the same pressure and temperature. Names of axes state the pressure, or the
+    temperature, if it varies or is `differing` among several curves."""
     curve = Results(directory, "steady")
     if "velocity" not in curve.read(outputs.BANDS):
         return []

@@ -219,9 +219,9 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
 def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
     """Return the `values` of the map called `name` for drawing, NaN at points that are not drawn.
 
-    Pressures are drawn where they are positive; if adhesion makes some negative, they are drawn everywhere. Gaps are
-    drawn outside of contact, or where they are positive if pressures are not given. The pressure of a fluid is drawn
-    outside of contact.
+    Pressures are drawn where they are positive; if adhesion makes some pressures negative, pressures are drawn
+    everywhere. Gaps are drawn outside of contact, or where they are positive if pressures are not given. The pressure
+    of a fluid is drawn outside of contact.
     """
     if name == "pressure":
         return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
@@ -237,8 +237,8 @@ def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array
     """Return a map of |traction| where surfaces touch, and a map of its ratio to the bound, which is 1 where points
     slip.
 
-    With a coefficient of friction the bound is this coefficient times the pressure. With a shear strength it is the
-    largest traction in the map.
+    With a coefficient of friction the bound is this coefficient times the pressure. With a shear strength the bound is
+    the largest traction in the map.
     """
     coefficient = job.section("interface").coefficient
     touching = _under_traction(traction, pressure, coefficient)
@@ -332,8 +332,8 @@ def draw_frames(
     dpi: int = 110,
 ) -> Iterator[Image.Image]:
     """Draw a saved map of shape (instant, y, x) at each index in `labels`, which has the text of each title, and yield
-    the images. All have one colour scale, and the `size` [inch] with `dpi` points per inch. Only the map and its title
-    are drawn anew for each frame."""
+    the images. All images have one colour scale, and the `size` [inch] with `dpi` points per inch. Only the map and its
+    title are drawn anew for each frame."""
 
     def read(index: int) -> Array:
         if name in STICK_MAPS:

@@ -386,7 +386,7 @@ NUMBER = re.compile(r"(?<=\d) (?=±|%|°C|(?:[nµmkMG]?(?:Pa|N|m|s|J|Hz)|h|min|d
 
 
 def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
-    """Write the report of output directories, and return its path (default: report.html in the first one).
+    """Write the report of output directories, and return its path (default: report.html in the first directory).
 
     Raises InputError for a directory without results, and for a file that cannot be written.
     """

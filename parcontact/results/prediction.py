@@ -89,7 +89,7 @@ def _times_of_run(job: Job) -> dict[int, float]:
 
 class SteadyInstant(NamedTuple):
     """One row of steady_theory.csv: velocity [m/s], mean pressure [Pa], temperature [deg C], shift factor, friction
-    coefficient and share in contact. The temperature is NaN if the curve is solved at that of the job."""
+    coefficient and share in contact. The temperature is NaN if the curve is solved at the temperature of the job."""
 
     velocity: float
     pressure: float
@@ -133,9 +133,9 @@ def predict_steady(job: Job, wanted: Request, shortest: float = 0.0) -> Iterator
 
 
 class BandInstant(NamedTuple):
-    """One row of bands_theory.csv: velocity [m/s], mean pressure [Pa], temperature [deg C] (NaN: that of the job),
-    number of the band, its longest and shortest wavelength [m], the friction of its waves, and the share in contact
-    with all waves down to its shortest."""
+    """One row of bands_theory.csv: velocity [m/s], mean pressure [Pa], temperature [deg C] (NaN for the temperature of
+    the job), number of the band, its longest and shortest wavelength [m], the friction of its waves, and the share in
+    contact with all waves down to the shortest wave of the band."""
 
     velocity: float
     pressure: float
@@ -149,7 +149,7 @@ class BandInstant(NamedTuple):
 
 def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
     """Yield friction and contact area of each band of a job. The friction of a band is the friction with all waves down
-    to its shortest, minus the friction without its waves."""
+    to the shortest wave of the band, minus the friction with the waves of coarser bands only."""
     cut = cut_bands(job)
     rows = dict[Wanted, list[SteadyInstant]]()
     for number in range(cut.count):

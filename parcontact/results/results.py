@@ -59,7 +59,7 @@ class ResultTable(Columns):
         return {name: known.get(PER_BRANCH if name.startswith("dissipated_") else name, "") for name in self}
 
     def arrays(self, needed: Sequence[str] = ()) -> dict[str, Array]:
-        """Return the columns as arrays; raises InputError if a needed one is missing."""
+        """Return the columns as arrays; raises InputError if a needed column is missing."""
         if missing := [name for name in needed if name not in self]:
             raise InputError(f"{self.path} has no column {', '.join(missing)}")
         return {name: np.array(values, dtype=float) for name, values in self.items()}
@@ -222,7 +222,7 @@ class Results:
 
     def failed_cases(self, most: int = 10**9) -> list[str]:
         """Return sentences on the failed cases of a sweep, at most `most`, and a sentence on the number of further
-        ones."""
+        failed cases."""
         failed = [int(row["case"]) for row in self.cases if row["state"] == "failed"]
         found = [": ".join(filter(None, (f"case {one} failed", self._why_failed(one)))) for one in failed[:most]]
         return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
@@ -294,7 +294,7 @@ class Results:
 
     @cached_property
     def steps(self) -> Timeline | None:
-        """The steps of a run, those to come with their expected number; None for a job without steps."""
+        """The steps of a run. The number of steps to come is an estimate. None for a job without steps."""
         if self.job is None or self.job.bands is not None:
             return None
         ends = zip(map(int, self.table["step"]), self.table["time"], strict=True)
@@ -336,7 +336,7 @@ class Results:
 def describe_end(best: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
     """Return a text which says that friction still rises at the end of the range of some `keys`, else ''. A key is
     named if at least three of its values occur in `rows`, and the row `best` with the highest friction has the lowest
-    or highest one."""
+    or the highest of these values."""
     found = dict[str, None]()
     for key in keys:
         values = sorted({row[key] for row in rows if isinstance(row[key], float) and row[key] == row[key]})

@@ -123,7 +123,7 @@ def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
 
 
 def lacks_load(columns: Mapping[str, Array]) -> bool:
-    """Return True if friction is not defined in a row of a slide, for want of a load that presses."""
+    """Return True if friction is not defined in a row of a slide, because no load presses the surfaces together."""
     slid = np.flatnonzero(np.diff(columns["distance"], prepend=0.0) > 0.0)
     listed = {name: values.tolist() for name, values in columns.items()}
     return _without_load(listed, np.array([0, *slid])).size > 0

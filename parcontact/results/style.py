@@ -150,7 +150,7 @@ def set_height(figure: Figure, height: float) -> None:
     """Set the height [inch] of a figure and fix its layout, so that Matplotlib does not compute it again to save the
     figure.
 
-    The layout is computed twice, as the first one at a new height keeps the margins of the old height.
+    The layout is computed twice, as the first layout at a new height keeps the margins of the old height.
     """
     layouts = 1 if height == figure.get_figheight() else 2
     figure.set_figheight(height)
@@ -184,7 +184,7 @@ def _draw_row(place: SubFigure, panels: Sequence[Draw], rows: int, columns: int)
 
 
 def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
-    """Add the legends of panels in rows, and return the height that each row needs for them [inch].
+    """Add the legends of panels in rows, and return the height that each row needs for its legends [inch].
 
     Entries that several panels share are placed once, below the last row. Other entries are placed in their panel, or
     below it if there are many.
