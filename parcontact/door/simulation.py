@@ -177,8 +177,8 @@ class Simulation:
 
         A job with an output directory runs as on the command line: from the newest checkpoint, from the beginning
         (`restart="never"`), or from the path of a checkpoint; `quiet=False` prints a line per step. A signal or a stop
-        file may stop it early (see `finished`); a second call continues. Raises RunError for a failed step, InputError
-        for a foreign directory.
+        file may stop the run early (see `finished`). A second call continues the run. Raises RunError for a failed
+        step, InputError for a foreign directory.
         """
         if not self.job.origin.names_directory:
             for _ in self.steps():

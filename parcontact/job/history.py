@@ -453,8 +453,8 @@ class Timeline:
 
     @classmethod
     def from_job(cls, job: Sections, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
-        """Return all steps of a job. If `until` [s] is later than the end of the history, the last stage continues to
-        it. `chosen` are the steps that a run has chosen so far; further steps are estimated."""
+        """Return all steps of a job. If `until` [s] is later than the end of the history, the last stage continues
+        until this time. `chosen` are the steps that a run has chosen so far; further steps are estimated."""
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 

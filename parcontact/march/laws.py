@@ -90,8 +90,8 @@ def of_solve(
     """Return the error for a step whose contact solve was given up; collective.
 
     `failed` is the contact of this solve. `tried` names the further attempts, and `last` is the contact of the last
-    one. `h` is the map of heights in the run's units, shape (rows of this rank, nx). The surface moves by `moved` cells
-    in the step.
+    attempt. `h` is the map of heights in the run's units, shape (rows of this rank, nx). The surface moves by `moved`
+    cells in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"

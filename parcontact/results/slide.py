@@ -13,24 +13,24 @@ surface. The loss of a cycle is the area of its loop,
     W = int (F - <F>) ds,
 
 where <F> is the mean force over the cycle: without it, creep under the mean force would count as a loss. A cycle that
-repeats the one before dissipates W. `phase` is the angle [rad] by which the first harmonic of s lags behind that of F.
-It is 0 for an elastic body.
+repeats the cycle before dissipates the energy W. `phase` is the angle [rad] by which the first harmonic of s lags
+behind the first harmonic of F. The phase is 0 for an elastic body.
 
 Where nothing moves along the surface, int F ds is the change of the column `work`, if the run saves energies
-(`output.energy`). Otherwise F and s are interpolated by Hermite's cubics between two rows. Their slopes are
+(`output.energy`). Otherwise F and s are interpolated by Hermite's cubics between two rows. The slopes of the cubics are
 differences, limited to STEEP times the smaller slope of both steps, so that a cubic stays between its ends. The error
 of W is a sum of up to five parts:
 
-* Interpolation: the loss from every second row minus the loss from all rows, divided by PAIRS. This takes the error to
-  fall with the third power of the step.
+* Interpolation: the loss from every second row minus the loss from all rows, divided by PAIRS. This assumes that
+  the error falls with the third power of the step.
 * Jumps of F, which are steps STEEP times as steep as both neighbours: half the product of the changes of F and s, as
   the jump may be anywhere in its step. With interpolation, the two steps on each side of a jump count in the same way.
 * If something slides: the error of friction, weighted with the force.
-* Else the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS
-  for motions of several harmonics.
-* Else the solver and the mesh. The solver's part is its error of the area (`march.budget`) times NOISE, divided by the
-  root of the number of steps and by the sine of the phase, as the loop is the small difference of two paths. The part
-  of the mesh is MESH times the error of the area.
+* If nothing slides, the length of steps: the error of a harmonic motion with these steps (`prony.discrete_modulus`),
+  times HARMONICS for motions of several harmonics.
+* If nothing slides, the solver and the mesh. The part of the solver is its error of the area (`march.budget`) times
+  NOISE, divided by the root of the number of steps and by the sine of the phase, as the loop is the small difference
+  of two paths. The part of the mesh is MESH times the error of the area.
 """
 
 import math

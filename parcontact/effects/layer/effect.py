@@ -239,7 +239,7 @@ class LongWavePreconditioner:
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Replace the residual r by the pressure z; collective. `working` is not 0 at the points whose pressure the
-        solver changes at present: r must be 0 elsewhere, and z has a meaning only there."""
+        solver changes at present. Elsewhere r must be 0, and z has no meaning."""
         self._weigh(working)
         if not self._first:
             self._given[0][...] = r
