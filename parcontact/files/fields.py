@@ -189,8 +189,8 @@ class FieldsFile(GrowingMaps):
         self._replace(None)
 
     def make_place(self, steps: Sequence[int]) -> None:
-        """Make place for maps after further `steps`, and for no other maps than these and the saved ones, which are
-        kept."""
+        """Lay out the file for the maps that are already saved, which are kept, and for maps after the given `steps`.
+        Places for other maps are removed."""
         found, _ = _found(self.path, self.slab)
         if found is not None:
             kept = found.reached(max(found.steps, default=0))

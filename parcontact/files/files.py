@@ -25,7 +25,7 @@ def unused(path: Path) -> Path:
 
 
 def without_mark(path: Path) -> Path:
-    """Return the final name of a file with the temporary name that `unused` gives; other paths are unchanged."""
+    """Return the final name of a file whose temporary name was made by `unused`. Other paths are returned unchanged."""
     return path.with_name(re.sub(r"\.[0-9a-f]{12}\.part$", "", path.name))
 
 

@@ -38,7 +38,8 @@ RESERVE = 1 << 20  # tuning: space tested for data other than maps, as HDF5 cras
 
 
 class Slice(NamedTuple):
-    """This rank's rows of the map that has the leading indices `at` in the dataset `name`."""
+    """This rank's rows of one map in the dataset `name`. `at` are the indices of the map along the first axes of the
+    dataset. `rows` is the array from which these rows are written, or into which they are read."""
 
     name: str
     at: tuple[int, ...]

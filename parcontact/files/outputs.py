@@ -63,8 +63,8 @@ class Outputs:
         return tuple(filter(None, (self.table, *self.tables, self.maps, self.log, *self.others)))
 
     def changes(self, then: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-        """Return the differences for which results of the job `then` cannot be continued with the job `now`, as a text,
-        or '' if there are none. Both jobs are plain data."""
+        """Return why results of the job `then` cannot be continued with the job `now`: a text on the differences of
+        both jobs, or '' if the results can be continued. Both jobs are plain data."""
         return differences(then, now, self.same)
 
     @property
@@ -187,8 +187,8 @@ def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> str:
     """Return a text on the first differences of two jobs (plain data) in the named sections (`grid`) or keys
-    (`numerics.kernel`). It states both values of each, and the number of further differences. Return '' if there is
-    none."""
+    (`numerics.kernel`). The text states both values of each of these differences, and the number of further
+    differences. Return '' if there is none."""
     old, new = dict(_leaves("", then)), dict(_leaves("", now))
     keys = (key for name in names for key in {**old, **new} if f"{key}.".startswith(f"{name}."))
     found = [f"{key} was {old.get(key)}, is {new.get(key)}" for key in keys if old.get(key) != new.get(key)]
@@ -196,8 +196,8 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
 
 
 def keep_mesh(job: Mapping[str, Any], different: str) -> str:
-    """Return advice on how to keep the mesh of a job (plain data), if `different`, a text on differences of two jobs,
-    names the mesh; else ''."""
+    """Return advice on how to keep the mesh of a job (plain data) if the mesh differs from that of another job, else
+    ''. `different` is a text on the differences of both jobs."""
     if "grid.points" not in different:
         return ""
     points = str(job["grid"]["points"]).replace(" ", "")

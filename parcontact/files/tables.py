@@ -106,7 +106,7 @@ Place = tuple[float, ...]  # speed [m/s], mean pressure [Pa], and temperature [d
 
 class Wanted(NamedTuple):
     """Parameters of a steady state: speed [m/s], mean pressure [Pa] and temperature [deg C]. If the temperature is NaN,
-    that of the material counts."""
+    the body has the temperature of its material."""
 
     speed: float
     pressure: float

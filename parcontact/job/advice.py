@@ -67,7 +67,8 @@ class Sections(Protocol):
         """Return True if the result depends on the history."""
 
     def asked(self, name: str) -> list[Any]:
-        """Return the attributes called `name` of the classes of effects whose sections the job has."""
+        """Return the attributes called `name` that classes of effects have. Only effects whose sections the job has are
+        asked."""
 
 
 Vector = tuple[float, float]

@@ -134,9 +134,9 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """Return the relative error of friction that time steps may cause. Steps that cause this error of friction
-        cause an error of the area of at most a quarter of it. So the returned value is not larger than the accuracy of
-        friction, nor than four times the accuracy of the area."""
+        """Return the relative error of friction that time steps may cause. The same steps cause an error of the area
+        that is at most a quarter as large. So the result is the accuracy of friction, or four times the accuracy of the
+        area if this is smaller."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 

@@ -87,7 +87,8 @@ def unit(kind: type[Part], key: str) -> str:
 
 
 def unit_of_path(path: str) -> str:
-    """Return the unit of a key such as history.1.velocity if all keys called velocity have the same unit; else ''."""
+    """Return the unit of a key such as history.1.velocity if all keys called velocity have the same unit. Otherwise
+    return ''."""
     units = _units().get(path.split(".")[-1], set())
     return next(iter(units)) if len(units) == 1 else ""
 

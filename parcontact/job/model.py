@@ -195,8 +195,8 @@ class Job(Part):
         return getattr(self, name, None)
 
     def asked(self, name: str) -> list[Any]:
-        """Return the attributes called `name` of the classes of effects whose sections the job has (see
-        `effects.effect.Effect`); effects without the attribute are left out."""
+        """Return the attributes called `name` that classes of effects have (see `effects.effect.Effect`). Only effects
+        whose sections the job has are asked; effects without the attribute are left out."""
         found = listing.effects_of(self._added_sections()).values()
         return [getattr(effect, name) for effect in found if hasattr(effect, name)]
 
@@ -391,7 +391,8 @@ def _included(definitions: Schema) -> Schema:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a section: a description of its values, and their unit, range and default, each '' if there is none."""
+    """A key of a section: a description of its values, and their unit, range and default. Each of these texts is '' if
+    there is none."""
 
     word: str
     must_be: str

@@ -97,7 +97,7 @@ def rules_of(*checks: Callable[..., Iterator[Fault]]) -> tuple[Rule, ...]:
 
 
 class Instead(NamedTuple):
-    """Advice on an unknown key, with the keys that are probably meant by it."""
+    """Advice on an unknown key, with the keys that the user probably meant."""
 
     advice: str
     keys: tuple[str, ...] = ()
@@ -121,8 +121,8 @@ class Part(BaseModel):
 
     @property
     def given(self) -> Part:
-        """Return this part as it was in the job. An effect may have replaced it, for example the material by two bodies
-        as one."""
+        """Return this part as it was in the job. An effect may have replaced it: a material that stands for two bodies
+        may replace the material of one body."""
         return self
 
     def left_out(self) -> tuple[str, ...]:

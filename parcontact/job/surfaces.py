@@ -110,7 +110,7 @@ class HeightArray(Part):
     )
 
     def stored(self) -> dict[str, Any]:
-        """Return the shape by which a stored job names these heights, `shape: file`, as plain data."""
+        """Return the shape `shape: file` with which a stored job refers to these heights, as plain data."""
         return {"shape": "file", "path": self.heights.name, "scale": 1.0, "dataset": "heights"}
 
 
@@ -286,8 +286,8 @@ class MapUnits(Part):
 class Topography(Part):
     """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .h5, .mat and text.
 
-    The part of the map around `centre` that is as large as the box is levelled, filled, made periodic and resampled to
-    the grid.
+    The job uses a part of the map, which lies around `centre` and is as large as the box. This part is levelled,
+    filled, made periodic and resampled to the grid.
     """
 
     shape: Literal["topography"] = "topography"
