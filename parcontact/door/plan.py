@@ -239,8 +239,8 @@ def _work(job: Job) -> float:
 def peak_memory() -> int:
     """Return the largest resident memory of this process so far [bytes].
 
-    The kernel's `VmHWM` begins with the program; On systems without `VmHWM`, `ru_maxrss` also counts the process that
-    started the program.
+    The kernel's `VmHWM` begins with the program. On systems without `VmHWM`, `ru_maxrss` is taken, which also counts
+    the process that started the program.
     """
     with suppress(OSError):
         found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())

@@ -237,9 +237,9 @@ def steady(
     collective.
 
     `job` and `set` are those of `Simulation`. Velocities and pressures are lists, or texts `first:last:count` for
-    numbers equally spaced in the logarithm. By default they are those of the job's `steady` section. If neither gives a
-    pressure, it is the pressure of the first stage under a load. `temperatures` [deg C] is a list, for a material with
-    a shift (default: the `steady` section). Nothing is written.
+    numbers equally spaced in the logarithm. Without these arguments, the velocities and pressures of the job's `steady`
+    section are taken. If that section gives no pressures, the pressure of the first stage under a load is taken.
+    `temperatures` [deg C] is a list, for a material with a shift (default: the `steady` section). Nothing is written.
 
     Raises JobError, and InputError for missing velocities or pressures. Failed points and implausible values give a
     ParcontactWarning on root.

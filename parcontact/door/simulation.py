@@ -37,8 +37,8 @@ class Row(Mapping[str, float]):
     """Measures of an instant: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
 
     Energies [J] that the job does not request (`output.energy`) are NaN. `dict(row)` has all columns. Type checkers
-    know the columns of the page `outputs` as attributes. Type checkers do not know columns of single branches, such as
-    `row["dissipated_0"]`, and columns of effects of other packages. A column that the job does not have raises
+    know the columns of the page `outputs` as attributes, but neither columns of single branches, such as
+    `row["dissipated_0"]`, nor columns of effects of other packages. A column that the job does not have raises
     AttributeError.
     """
 

@@ -184,7 +184,7 @@ def _travel(
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
     """Return the contact law of a scene: the law that an effect provides, or else the law of the scene's constraint on
     pressures. A law with the method `upon` extends the law of the constraint: `upon` takes this law and returns the
-    extended one."""
+    extended law."""
     dry, law = DryLaw(scene), scene.law
     return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
 
