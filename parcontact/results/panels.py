@@ -28,6 +28,7 @@ from . import style
 SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
 SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
 MOST_EDGES = 7  # most labels of the bar of colours of bands
+LEAST_RANGE = 0.01  # least range of an axis over its largest value
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
 LEAST = 0.99  # largest downward error bar over the value
@@ -296,7 +297,8 @@ def set_scale(axes: Axes, which: str, of: Axis, log: bool) -> None:
 
 
 def _set_limits(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool) -> None:
-    """Set limits that include 0 and error bars up to the value; cut off a spike, and print its height."""
+    """Set limits that include 0 and error bars up to the value; cut off a spike, and print its height. A panel without
+    0 shows at least the share LEAST_RANGE of its values: smaller changes are errors of the mesh."""
     stacks = {one.stack for one in series} - {None}
     wholes = [np.sum([one.y for one in series if one.stack == stack], axis=0) for stack in stacks]
     ys = np.concatenate([*wholes, *(one.y for one in series)])
@@ -306,6 +308,10 @@ def _set_limits(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool) -
         axes.set_ylim(0.0, (PEAK_ROOM if panel.peak else HEADROOM) * max(highest, *map(_highest, bars), 0.0) or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # there are no values for a scale
+    ends = float(np.nanmin(ys, initial=np.inf)), float(np.nanmax(ys, initial=-np.inf))
+    least = LEAST_RANGE * max(map(abs, ends))
+    if not panel.bottom and 0.0 < ends[1] - ends[0] < least < np.inf:
+        axes.set_ylim(0.5 * (sum(ends) - least), 0.5 * (sum(ends) + least))
     if panel.spikes and not log_x:
         xs = np.concatenate([one.x for one in series])
         late = xs > np.nanmin(xs) + SPIKE_SHARE * (np.nanmax(xs) - np.nanmin(xs))

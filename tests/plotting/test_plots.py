@@ -219,6 +219,17 @@ def test_comparison(tmp_path: Path, drawn: list[Figure]) -> None:
     assert touching(drawn[0]) == []
 
 
+@pytest.mark.parametrize(("change", "share"), [(1e-4, 0.01), (0.1, 1.0)])
+def test_noise_does_not_fill_a_panel(change: float, share: float) -> None:
+    """An approach that varies by 0.01 % varies by the mesh: it fills 1 % of the axis. A creep fills all of it."""
+    axes = Figure().add_subplot()
+    values = 1.5e-6 * (1.0 - change * np.array([0.0, 1.0, 0.0, 1.0]))
+    line = Line("", np.arange(4.0), values, style.line(0))
+    draw(Panel("approach", Axis("time", "s"), Axis("approach", "m"), [line], bottom=False), axes)
+    low, high = axes.get_ylim()
+    assert 1.5e-6 * change / (high - low) == pytest.approx(share, rel=0.15)
+
+
 def test_slow_and_fast_slides_are_compared_over_their_way(tmp_path: Path, drawn: list[Figure]) -> None:
     """Over time the fast one would take a hundredth of the axis; of slides of similar times nothing changes."""
     press, runs = "{pressure: 1.0e3, duration: 1.0e-4, time_step: 1.0e-4}", []
