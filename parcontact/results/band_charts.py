@@ -326,6 +326,9 @@ def panels_of_sweep(directory: Path) -> list[Panel]:
         keys = [name for name, values in places.items() if len(values) > 1] + keys
     if not keys:
         return []
+    boxes = {repr([row[name] for name in _swept(rows) if "grid." in name]) for row in rows}
+    if (area := Results(directory, "sweep").free_area) and len(boxes) == 1:
+        rows, panels = [_with_area(row, area) for row in rows], [_in_free_box(panel, area) for panel in panels]
     key = keys[0]
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), unit_of_path(word)), []
@@ -336,6 +339,16 @@ def panels_of_sweep(directory: Path) -> list[Panel]:
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
             found.append(Panel(panel.key, x, panel.y, series, log_x=wide))
     return found
+
+
+def _with_area(row: dict[str, Any], area: float) -> dict[str, Any]:
+    """Return a row of a sweep with contact areas [m²] in a box of an `area` [m²]."""
+    found = {name: row.get(name) for name in (CORRECTED, "theory_contact_area")}
+    return row | {name: share * area for name, share in found.items() if isinstance(share, float)}
+
+
+def _in_free_box(panel: ColumnPanel, area: float) -> ColumnPanel:
+    return replace(panel, y=to_contact_area(np.zeros(0), area)[0]) if panel.key == "area" else panel
 
 
 def _swept(rows: Rows) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawing import entries
+from drawing import ELASTIC, SPHERE, entries
 from legible import assert_legible
 from matplotlib.figure import Figure
 
@@ -50,6 +50,20 @@ def test_means_over_seeds_with_cases_and_theory(tmp_path: Path) -> None:
     assert {one.look["color"] for one in (highest, cases, theory)} == {highest.look["color"]}
     assert names_of(friction) == ["highest", "each case", "theory, highest", "dynamic"]
     assert np.allclose(lines_of(area)[0].y, 0.2)
+
+
+def test_areas_in_a_free_box_are_in_square_metres(tmp_path: Path) -> None:
+    """Its size is the user's choice; boxes of several sizes have no common area."""
+    (tmp_path / "cases" / "000").mkdir(parents=True)
+    sphere = SPHERE.replace("{shape: sphere, radius: 1.0e-2}", "[{shape: sphere, radius: 1.0e-2}]")
+    text = f"{sphere}{ELASTIC}history: [{{force: 0.1}}]\ncheckpoint: {{}}\n"  # a box of 4 mm²
+    (tmp_path / "cases" / "000" / "job.resolved.yaml").write_text(text)
+    rows = [case(velocity, 1, 3.0) for velocity in (1.0, 20.0)]
+    _, area = band_charts.panels_of_sweep(saved(tmp_path, *rows))
+    assert (area.y.name, area.y.unit) == ("contact area", "m²")
+    assert lines_of(area)[0].y.tolist() == pytest.approx([0.8e-6, 0.8e-6])
+    _, shares = band_charts.panels_of_sweep(saved(tmp_path, *rows, case(1.0, 1, 3.0, size=2.0)))
+    assert np.allclose(lines_of(shares)[0].y, 0.2)
 
 
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
