@@ -275,8 +275,23 @@ def _make_lines(
         rows = np.flatnonzero((places == place[:, None]).all(axis=0))
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
         label = ", ".join(printed.quantity(value, unit) for value, unit in zip(place, by.values(), strict=True))
-        look = style.line(number, values.shape[1]) | {"marker": "o"}
+        look = _choose_look(values, number)
         yield Line(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
+
+
+def _choose_look(values: Array, number: int) -> dict[str, Any]:
+    """Return the look of a line out of those with different `values` of one column or of two, shape (columns, lines).
+
+    Lines have colours and dashes of their own. If two columns vary, the column with more values has colours, and the
+    other one has marks and dashes.
+    """
+    kinds = [np.unique(row) for row in values]
+    if len(kinds) < 2 or min(kind.size for kind in kinds) < 2:
+        return style.line(number, values.shape[1]) | {"marker": "o"}
+    (hue, hues), (mark, _) = sorted(enumerate(kinds), key=lambda pair: -pair[1].size)
+    places = [int(np.searchsorted(kind, row[number])) for kind, row in zip(kinds, values, strict=True)]
+    dashes, marker = (looks[places[mark] % len(looks)] for looks in (style.DASHES, style.MARKERS))
+    return {"color": style.colors(hues.size)[places[hue]], "linestyle": dashes, "marker": marker}
 
 
 def _make_thin(

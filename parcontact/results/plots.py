@@ -24,7 +24,6 @@ from .plotted_run import PlottedRun
 from .results import Results, read_cases, swept_keys
 
 PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
-MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
 MARK_EVERY = 0.15  # distance of the marks of a line of many points, over the diagonal of a panel
 PALEST = 0.75  # share of white in the bars of the longest waves in a comparison
 APART = 10.0  # ratio of the longest to the shortest time of runs above which a common axis of time hides the shortest
@@ -271,7 +270,7 @@ def _merge(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Lin
     colors = style.colors(len(names))
     whole = [one for _, panel in group for one in panel.series]
     marked = dict.fromkeys(one.name for one in whole if one.name and one.x.size and one.stack is None)
-    marks = dict(zip(marked, itertools.cycle(MARKERS), strict=False)) if len(marked) > 1 else {}
+    marks = dict(zip(marked, itertools.cycle(style.MARKERS), strict=False)) if len(marked) > 1 else {}
     entries = [entry(names[number], {"color": colors[number]}) for number, _ in group]
     for name, mark in marks.items():
         entries.append(entry(name, {"color": style.GREY, "marker": mark, "linestyle": "none"}))

@@ -40,6 +40,7 @@ Draw = Callable[[Axes], None]  # draws one panel
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito 2008, no yellow
 DASHES = ("-", "--", "-.", ":")  # with the colours, for black and white prints
+MARKERS = "os^DvP*X<>"  # marks of lines of one colour, in the same order
 BLUE, RED, GREEN, *_ = COLORS
 GREY = "0.4"
 SEQUENCE, LIGHTEST = "viridis", 0.9  # colour map for quantities in an order, such as instants, and its used part

@@ -67,6 +67,19 @@ def test_errors_and_the_corrected_area(tmp_path: Path, drawn: list[Figure]) -> N
     assert friction.get_ylim()[1] > 0.2
 
 
+def test_temperatures_and_loads_have_looks_of_their_own(tmp_path: Path) -> None:
+    """Nine loads have colours and two temperatures have marks, not eighteen lines eighteen shades."""
+    loads, degrees = [1e4 * (k + 1) for k in range(9)], [0.0, 40.0]
+    rows = [f"{v},{p},{t},0.1,0.2\n" for t in degrees for p in loads for v in (0.1, 1.0)]
+    (tmp_path / "steady.csv").write_text("velocity,pressure,temperature,friction,contact_area\n" + "".join(rows))
+    friction, _ = band_charts.panels_of_curve(tmp_path)
+    looks = [(line.look["color"], line.look["marker"]) for line in friction.series]
+    assert len(set(looks)) == 18
+    assert [len(set(one)) for one in zip(*looks, strict=True)] == [9, 2]
+    for line in friction.series:
+        assert line.look["marker"] == ("o" if line.name.startswith("0 °C") else "s")
+
+
 def test_a_table_without_errors(tmp_path: Path) -> None:
     """Older tables have none, and no corrected area: the counted one is drawn."""
     (tmp_path / "steady.csv").write_text("velocity,pressure,friction,contact_area\n1.0,1e3,0.1,0.2\n")
