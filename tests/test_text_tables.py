@@ -34,7 +34,7 @@ def read_shift_table(path: Path) -> Array:
 def read_spectrum(path: Path) -> Array:
     """q [1/m] and C2D [m^4]."""
     found, _ = measured_maps.read_spectrum(
-        RoughSpectrum.model_construct(spectrum=path, normalisation="physical", hurst=None)
+        RoughSpectrum.model_construct(spectrum=path, normalisation="physical", hurst=None), False
     )
     return np.stack([found.q, found.phi / (4 * np.pi**2)], 1)
 

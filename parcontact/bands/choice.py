@@ -89,8 +89,8 @@ class WaveSpectrum:
 
 
 def spectrum_of(job: Job, line: bool = False) -> WaveSpectrum:
-    """Return the spectrum of the rough shapes of a job. Raises InputError for tables that cannot be read, and for
-    spectra of a surface [m^4] if the job has profiles."""
+    """Return the spectrum of the rough shapes of a job, of profiles if `line` is True. Raises InputError for tables
+    that cannot be read, or have no such spectrum."""
     parts = [part for part in job.surface if isinstance(part, jobs.Rough | jobs.RoughSpectrum)]
     found = [_part(part, line) for part in parts]
     longest, shortest = max(one.longest for one in found), min(one.shortest for one in found)
@@ -106,9 +106,7 @@ def _sum(parts: Sequence[Callable[[Array], Array]]) -> Callable[[Array], Array]:
 
 def _part(part: jobs.Rough | jobs.RoughSpectrum, line: bool) -> WaveSpectrum:
     if isinstance(part, jobs.RoughSpectrum):
-        if line:
-            raise InputError("surface: a spectrum in m^4 is of a surface, and bands.points are those of a line")
-        found, (longest, shortest) = measured_maps.read_spectrum(part)
+        found, (longest, shortest) = measured_maps.read_spectrum(part, line)
         ends = 2.0 * np.pi / longest * EDGE, 2.0 * np.pi / shortest / EDGE
         inside = lambda k: np.where((k >= ends[0]) & (k <= ends[1]), found(k), 0.0)  # noqa: E731
         return WaveSpectrum(inside, longest, shortest, line, tuple(found.q.tolist()))
@@ -118,8 +116,6 @@ def _part(part: jobs.Rough | jobs.RoughSpectrum, line: bool) -> WaveSpectrum:
         factor = part.rms_slope**2 / unit.moment(*unit.ends, 2)
     elif part.rms_height is not None:
         factor = part.rms_height**2 / unit.moment(*unit.ends, 0)
-    elif line:
-        raise InputError("surface: psd_constant is of a surface, and bands.points are those of a line; give rms_slope")
     else:
         factor = part.psd_constant or 0.0
     return replace(unit, phi=lambda k: factor * unit.phi(k), kinks=(2.0 * np.pi / limits[1],))

@@ -84,6 +84,11 @@ class Grid(Part):
         return self.boundary != "free", self.boundary == "periodic"
 
     @property
+    def is_line(self) -> bool:
+        """Return True for one row or column of points, on which surfaces are profiles; False for a single point."""
+        return (self.nx == 1) != (self.ny == 1)
+
+    @property
     def nx(self) -> int:
         return self.points[0]
 

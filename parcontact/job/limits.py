@@ -87,6 +87,17 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
                 yield Fault(sentence, ("surface", index, "waves", number))
 
 
+def constants_are_of_surfaces(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
+    """Yield errors for constants of a surface's spectrum [m^4] on one row or column of points."""
+    points = grid.points if bands is None else getattr(bands, "points", None) or ()
+    if 1 not in points:
+        return
+    for index, shape in enumerate(surface):
+        if isinstance(shape, Rough) and shape.psd_constant is not None:
+            sentence = "is the constant of a surface's spectrum [m^4], and one row of points is a profile"
+            yield Fault(f"{sentence}; give rms_slope or rms_height", ("surface", index, "psd_constant"))
+
+
 def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
     """Yield errors for bands of a surface without a spectrum, and for outputs that do not exist in bands. The first
     shape may be a measured map if a shape with a spectrum follows."""
@@ -345,6 +356,7 @@ RULES = rules_of(
     waves_are_independent,
     some_shape,
     waves_fit,
+    constants_are_of_surfaces,
     arrays_fit,
     some_history,
     some_load,

@@ -13,6 +13,8 @@ and the density Phi of `physics.roughness`, by which random surfaces are made, i
 
     Phi = 4 pi^2 C2D,    C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq    (Abel's equation).
 
+A profile, on one row or column of points, has the C1D of the table, and Phi = 2 pi C1D.
+
 SurfaceTopography and contact.engineering write pi C1D and 4 pi^2 C2D (T. D. B. Jacobs, T. Junge, L. Pastewka, Surf.
 Topogr.: Metrol. Prop. 5 (2017) 013001): `normalisation: surface_topography` divides by these factors.
 
@@ -234,15 +236,16 @@ FORMS = "q[1/m] C2D[m^4] or q[1/m] C1D[m^3] (or mm, um, nm)"
 
 @dataclass(frozen=True)
 class MeasuredSpectrum:
-    """An isotropic spectrum: its density `phi` [m^4] at rising wavenumbers `q` [rad/m], both of shape (n,). Beyond the
-    last wavenumber it falls with the power -`fall` of q, or is 0 if `fall` is 0."""
+    """The spectrum of an isotropic surface or of a profile: its density `phi` [m^4 or m^3] at rising wavenumbers `q`
+    [rad/m], both of shape (n,). Beyond the last wavenumber it falls with the power -`fall` of q, or is 0 if `fall` is
+    0."""
 
     q: Array
     phi: Array
     fall: float
 
     def __call__(self, k: Array) -> Array:
-        """Return Phi [m^4] at wavenumbers `k` [rad/m]."""
+        """Return Phi at wavenumbers `k` [rad/m]."""
         inside = (k >= self.q[0] * (1 - EDGE)) & ((k <= self.q[-1] * (1 + EDGE)) | (self.fall > 0.0))
         with np.errstate(divide="ignore"):
             log = np.interp(np.log(k), np.log(self.q), np.log(self.phi))
@@ -250,14 +253,20 @@ class MeasuredSpectrum:
         return np.where(inside, np.exp(log), 0.0)
 
 
-def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, float]]:
-    """Return the spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
+def read_spectrum(part: RoughSpectrum, line: bool) -> tuple[MeasuredSpectrum, tuple[float, float]]:
+    """Return the spectrum of a job's surface, or of a profile if `line` is True, and its longest and shortest
+    wavelengths [m]. Raises InputError, also for the C2D of a surface if `line` is True."""
     q, values, power = _read(part.spectrum)
     if part.normalisation == "surface_topography":
         values = values / LARGER[power]
-    if power == POWERS["C1D"]:
+    if line and power == POWERS["C2D"]:
+        raise InputError(
+            f"{part.spectrum}: C2D is the spectrum of a surface, and the job has one row of points; give the spectrum "
+            "C1D of a profile along the row, or several rows of points"
+        )
+    if not line and power == POWERS["C1D"]:
         q, values = _over_directions(part.spectrum, q, values, part.hurst)
-    fall = 2.0 * (1.0 + part.hurst) if part.hurst is not None else 0.0
+    fall = 2.0 * (1.0 + part.hurst) - line if part.hurst is not None else 0.0
     longest, shortest = 2 * np.pi / q[0], 2 * np.pi / q[-1]
     wanted = part.long_wavelength or longest, part.short_wavelength or shortest
     if wanted[0] > longest * (1 + EDGE):
@@ -267,16 +276,22 @@ def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, f
             f"{part.spectrum}: short_wavelength is {wanted[1]:.6g} m, but the data end at {shortest:.6g} m; give hurst "
             "to extrapolate them by a power law"
         )
-    return MeasuredSpectrum(q, 4 * np.pi**2 * values, fall), wanted
+    return MeasuredSpectrum(q, _density(values, line), fall), wanted
 
 
-def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
-    """Return the spectrum of an isotropic surface from a line scan, and its longest and shortest wavelengths [m].
+def _density(values: Array, line: bool) -> Array:
+    """Return Phi from C1D of a line, or from C2D."""
+    return (2.0 * np.pi if line else 4.0 * np.pi**2) * values
+
+
+def of_scan(part: Topography, scan: Map, line: bool) -> tuple[MeasuredSpectrum, tuple[float, float]]:
+    """Return the spectrum of an isotropic surface from a line scan, or of a profile if `line` is True, and its longest
+    and shortest wavelengths [m].
 
     C1D of the levelled scan is computed with Hann's window, and averaged over `BINS` parts of each decade of
     wavenumbers. Raises InputError.
     """
-    heights, length = line.heights, line.size[0]
+    heights, length = scan.heights, scan.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):
         raise InputError(f"{part.path}: a line scan of at least {FEWEST_OF_LINE} points, not flat, was expected")
     level = remove_trend(heights, np.isfinite(heights), part.detrend)[0]
@@ -292,11 +307,9 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
         (np.bincount(bins, values) / np.maximum(np.bincount(bins), 1))[np.unique(bins)]
         for values in (2 * np.pi / length * waves, length / np.pi * power[waves])
     )
-    kept, c2 = _over_directions(part.path, q, c1, None)
-    return MeasuredSpectrum(kept, 4 * np.pi**2 * c2, 0.0), (
-        2 * np.pi / kept[0],
-        part.short_wavelength or 2 * np.pi / kept[-1],
-    )
+    kept, values = (q, c1) if line else _over_directions(part.path, q, c1, None)
+    ends = 2 * np.pi / kept[0], part.short_wavelength or 2 * np.pi / kept[-1]
+    return MeasuredSpectrum(kept, _density(values, line), 0.0), ends
 
 
 def _read(path: Path) -> tuple[Array, Array, int]:

@@ -188,7 +188,8 @@ class Rough(Part):
 
 class RoughSpectrum(Part):
     """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or `q[1/m]
-    C1D[m^3]` of profiles. With `hurst` the spectrum is extrapolated to shorter waves as q^(-2 (1 + hurst)).
+    C1D[m^3]` of profiles. With `hurst` the spectrum is extrapolated to shorter waves as q^(-2 (1 + hurst)). On one row
+    or column of points the surface is a profile with the C1D of the table.
 
     The default range of wavelengths is the range of the data.
     """

@@ -248,7 +248,7 @@ def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> fl
     if isinstance(shape, RoughSpectrum):
         from ..job import measured_maps
 
-        return float(measured_maps.read_spectrum(shape)[1][1])
+        return float(measured_maps.read_spectrum(shape, box.is_line)[1][1])
     if isinstance(shape, OnOneMesh):
         raise InputError("heights from a file or an array are given on one mesh; give its numbers of points")
     if isinstance(shape, Topography):

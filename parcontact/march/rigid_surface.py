@@ -146,8 +146,8 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks)
     def make() -> tuple[list[Doubt], tuple[measured_maps.MeasuredSpectrum, tuple[float, float]] | None]:
         found = map_files.read_map(part)
         if found.is_line:
-            remarks.notes.append(describe_line(part, found))
-            return [], measured_maps.of_line(part, found)
+            remarks.notes.append(describe_scan(part, found, grid.is_line))
+            return [], measured_maps.of_scan(part, found, grid.is_line)
         prepared = measured_maps.prepare(part, grid, found)
         heights.append(prepared.heights)
         remarks.notes.extend(describe_treatment(prepared))
@@ -163,7 +163,7 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks)
 def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
     from ..job import measured_maps
 
-    found, (long, short) = on_root(fft.slab.comm, lambda: measured_maps.read_spectrum(part))
+    found, (long, short) = on_root(fft.slab.comm, lambda: measured_maps.read_spectrum(part, grid.is_line))
     if fft.slab.root:
         notes.append(f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}")
     return _random_surface(found, (long, short), grid, fft, notes, part.seed, part.amplitudes == "random")
@@ -242,12 +242,12 @@ def describe_treatment(prepared: "Prepared") -> list[str]:
     return lines
 
 
-def describe_line(part: jobs.Topography, line: "Map") -> str:
-    """Return a sentence on the random surface that is made from the line scan `line`."""
-    length = quantity(line.size[0], "m", 4)
+def describe_scan(part: jobs.Topography, scan: "Map", line: bool) -> str:
+    """Return a sentence on the random surface, or profile if `line` is True, that is made from a line scan."""
+    length, made = quantity(scan.size[0], "m", 4), "profile" if line else "isotropic one"
     return (
-        f"road: {part.path.name} is a line scan of {line.heights.size} points over {length}; the surface is a random "
-        "isotropic one with its spectrum (C1D)"
+        f"road: {part.path.name} is a line scan of {scan.heights.size} points over {length}; the surface is a random "
+        f"{made} with its spectrum (C1D)"
     )
 
 

@@ -5,7 +5,9 @@ At the wavenumber k [rad/m], with the roll-off k_r, the density [m^4] is (paper,
     Phi(k) = C                             long-wavelength end <= k < roll-off
              C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
 
-The transform of the heights h satisfies `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from
+The transform of the heights h satisfies `|FFT(h)|^2 = Phi (nx ny)^2 / area`. On one row or column of points the
+surface is a profile along it, whose Phi [m^3] is that of its waves with k > 0: `<h^2> = int Phi dk/(2 pi)`, and area
+stands for twice its length. The random numbers of a wave come from
 a stream that depends on the seed and on the wavenumber along x: a seed gives the same waves on every grid and any
 number of ranks, and no rank holds the whole spectrum.
 
@@ -40,7 +42,7 @@ EDGE = 1.0 - 1e-9  # accuracy: factor on limits of wavenumbers, against rounding
 @dataclass(frozen=True)
 class Roughness:
     """Parameters of a random surface; lengths in m. One of `rms_slope`, `rms_height` and `psd_constant` (C of the
-    module, m^4) is given.
+    module, m^4, m^3 for a profile) is given.
 
     `stretch` is a ratio and an angle from the x axis [rad]. With the wavenumbers k_along the direction of this angle
     and k_across, Phi is a function of the length of the vector (ratio k_along, k_across), so that waves along the angle
@@ -81,16 +83,19 @@ class Roughness:
         if square_height == 0.0:
             limits = f"{self.short_wavelength:g} m and {self.long_wavelength:g} m"
             raise InputError(f"a rough surface has no wave between {limits} that fits the box and the grid")
-        return np.asarray(waves * (self._amplitude(square_height, square_slope, size) * fft.mx * fft.my))
+        area = size[0] * size[1]
+        if (fft.mx == 1) != (fft.my == 1):  # a profile, whose waves k and -k share Phi
+            area = 2.0 * (size[1] if fft.mx == 1 else size[0])
+        return np.asarray(waves * (self._amplitude(square_height, square_slope, area) * fft.mx * fft.my))
 
-    def _amplitude(self, square_height: float, square_slope: float, size: tuple[float, float]) -> float:
-        """Return the factor for a surface of C = area 1 m^4 with the given mean squares."""
+    def _amplitude(self, square_height: float, square_slope: float, area: float) -> float:
+        """Return the factor for a surface of C = area = 1 with the given mean squares."""
         if self.rms_slope is not None:
             return float(self.rms_slope / np.sqrt(square_slope))
         if self.rms_height is not None:
             return float(self.rms_height / np.sqrt(square_height))
         if self.psd_constant is not None:
-            return float(np.sqrt(self.psd_constant / (size[0] * size[1])))
+            return float(np.sqrt(self.psd_constant / area))
         raise ValueError("one of rms_slope, rms_height and psd_constant is needed")
 
     def _key(self, index_x: int) -> list[int]:

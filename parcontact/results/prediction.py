@@ -310,7 +310,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
     the box or shorter than two cells. `slide` is the largest distance [m] between two positions of the surface."""
     from ..job import measured_maps
 
-    found, (long, short) = measured_maps.read_spectrum(part)
+    found, (long, short) = measured_maps.read_spectrum(part, job.grid.is_line)
     cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
     ends = 2 * np.pi / min(long, max(job.grid.size)), 2 * np.pi / max(short, 2 * cell)
     if ends[0] >= EDGE * ends[1]:
@@ -322,14 +322,9 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
 def _rings_on_grid(
     job: Job, density: Callable[[Array], Array], ends: tuple[float, float], slide: float, kinks: Sequence[float]
 ) -> Rings:
-    """Return the waves of a spectrum [m^4] between the wavenumbers `ends` [rad/m] on the grid of a job.
-
-    On one row or column of points all waves lie along it. The mean square of a wave is then the spectrum over the area
-    of the box, which belongs to k and to -k.
-    """
-    line = 1 in job.grid.points
-    norm = 2 / job.grid.size[job.grid.points.index(1)] if line else 1.0
-    rings = persson.rings_of_spectrum(lambda k: norm * np.asarray(density(k), float), *ends, slide, kinks, line=line)
+    """Return the waves of a spectrum [m^4] between the wavenumbers `ends` [rad/m] on the grid of a job. On one row or
+    column of points all waves lie along it, and the spectrum [m^3] is that of the profile."""
+    rings = persson.rings_of_spectrum(density, *ends, slide, kinks, line=job.grid.is_line)
     if job.grid.points[0] > 1:
         return rings
     amplitude, kx, ky = rings.waves

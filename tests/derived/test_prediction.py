@@ -66,10 +66,13 @@ def test_full_contact_is_that_of_the_run() -> None:
     assert min(row.contact_area for row in found[1:]) > 1.0 - 1e-9
 
 
+MAP, PROFILE = {"points": 64, "size": 1e-3}, {"points": [512, 1], "size": [8e-3, 1e-3]}
+SLOPE, HEIGHT, CONSTANT = {"rms_slope": 0.01}, {"rms_height": 3e-7}, {"psd_constant": 1e-21}
+
+
 @pytest.mark.parametrize(
-    "grid", [{"points": 64, "size": 1e-3}, {"points": [512, 1], "size": [8e-3, 1e-3]}], ids=["map", "profile"]
+    ("amount", "grid"), [(SLOPE, MAP), (HEIGHT, MAP), (CONSTANT, MAP), (SLOPE, PROFILE), (HEIGHT, PROFILE)]
 )
-@pytest.mark.parametrize("amount", [{"rms_slope": 0.01}, {"rms_height": 3e-7}, {"psd_constant": 1e-21}])
 def test_continuum_and_lattice(amount: dict[str, float], grid: dict[str, Any]) -> None:
     """In full contact friction depends on the spectrum only: a box with many waves of fixed amplitudes is near it.
 
@@ -83,22 +86,6 @@ def test_continuum_and_lattice(amount: dict[str, float], grid: dict[str, Any]) -
     lattice, continuum = (predicted(one, waves)[-1] for waves in ("lattice", "continuum"))
     assert lattice.contact_area == continuum.contact_area == 1.0
     assert_allclose(lattice.friction, continuum.friction, rtol=0.05)
-
-
-@pytest.mark.parametrize(
-    ("points", "size"), [([256, 256], [0.032, 0.032]), ([2048, 1], [0.256, 0.01]), ([1, 2048], [0.01, 0.256])]
-)
-def test_waves_of_a_table(points: list[int], size: list[float], tmp_path: Path) -> None:
-    """The slopes along both sides are those of the surface, also on one row or column; 1 %: some 40 waves a side."""
-    rows = [f"{q:.6g},{1e-21 * (q / 1e3) ** -3.6:.6g}" for q in np.geomspace(1e3, 2e4, 30)]
-    (tmp_path / "psd.csv").write_text("\n".join(["q[1/m],C2D[m^4]", *rows]))
-    rough = {"shape": "rough", "spectrum": str(tmp_path / "psd.csv"), "seed": 3, "amplitudes": "fixed"}
-    one = job(surface=[rough], grid={"points": points, "size": size})
-    slopes = []
-    for rings in (prediction._continuum(one, 0.0), prediction._lattice(one, Slab.alone(*one.grid.points))):
-        power = np.abs(rings.waves.amplitude) ** 2 / 2
-        slopes.append([np.sqrt(np.sum(power * k**2)) for k in (rings.waves.kx, rings.waves.ky)])
-    assert_allclose(slopes[0], slopes[1], rtol=0.01)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,10 @@ from scipy.special import gamma
 
 import parcontact as pc
 from parcontact import job as jobs
+from parcontact.bands.choice import cut_bands
 from parcontact.errors import InputError
 from parcontact.job import map_files, measured_maps
+from parcontact.job.calculation import Bands
 from parcontact.job.map_files import UNITS
 from parcontact.march import rigid_surface, sanity, scene
 from parcontact.march.time_error import properties_of
@@ -84,7 +86,7 @@ def test_profiles_become_directions(tmp_path: Path) -> None:
     q = np.geomspace(2e3, 1e6, 60)
     part = load(tmp_path, table("q[1/m],C1D[m^3]", q, c1(q))).surface[0]
     assert isinstance(part, jobs.RoughSpectrum)
-    found, ends = measured_maps.read_spectrum(part)
+    found, ends = measured_maps.read_spectrum(part, False)
     assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.011, abs=0.0)
     assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
 
@@ -94,7 +96,7 @@ def test_oblique_waves_are_in_the_height(tmp_path: Path) -> None:
     q = np.geomspace(1e3, 1e6, 200)
     part = load(tmp_path, table("q[1/m] C1D[m^3]", q, 1e-3 * q**-3.0)).surface[0]
     assert isinstance(part, jobs.RoughSpectrum)
-    found, _ = measured_maps.read_spectrum(part)
+    found, _ = measured_maps.read_spectrum(part, False)
     whole = np.trapezoid(q**2 * found(q) / (2 * np.pi), np.log(q))
     assert whole == pytest.approx(2.0 * np.trapezoid(1e-3 * q**-2.0, np.log(q)), rel=1e-3, abs=0.0)
 
@@ -112,16 +114,75 @@ def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05, abs=0.0)
 
 
+PROFILE = {"q": (1e4, 2e5), "C1D": (1e-17, -2.6)}  # ends [rad/m]; C1D [m^3] at the first, and its power of q
+
+
+def moment(power: int) -> float:
+    """int C1D q^power dq between the ends, in closed form."""
+    (low, high), (start, fall) = PROFILE["q"], PROFILE["C1D"]
+    top = fall + power + 1
+    return start * low ** (power + 1) * ((high / low) ** top - 1) / top
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-5])
+@pytest.mark.parametrize("along", [0, 1], ids=["row", "column"])
+def test_a_table_of_profiles_on_one_line_of_points(tmp_path: Path, along: int, width: float) -> None:
+    """A row or column has the mean square heights and slopes of the table, whatever its width: the grid, a grid of its
+    bands, and Persson's waves of both. 1 %: some 1500 waves stand for the integral."""
+    q = np.geomspace(*PROFILE["q"], 30)
+    text = table("q[1/m],C1D[m^3]", q, PROFILE["C1D"][0] * (q / q[0]) ** PROFILE["C1D"][1])
+    job, length = load(tmp_path, text), 50e-3
+    points, size = ((4096, 1), (length, width)) if along == 0 else ((1, 4096), (width, length))
+    job = job.model_copy(update={"grid": jobs.Grid(points=points, size=size)})
+    heights = np.ravel(heights_of(job)[0])
+    power = 2.0 * np.abs(np.fft.rfft(heights) / heights.size) ** 2
+    k = 2.0 * np.pi / length * np.arange(power.size)
+    assert [power.sum(), (power * k**2).sum()] == pytest.approx([moment(0), moment(2)], rel=0.01, abs=0.0)
+    bands = job.model_copy(update={"bands": Bands(points=(4096, 1))})
+    spectrum = cut_bands(bands).spectrum
+    found = [spectrum.moment(*spectrum.ends, power) for power in (0, 2)]
+    assert found == pytest.approx([moment(0), moment(2)], rel=1e-3, abs=0.0)
+    for one in (job, bands):
+        amplitude, kx, ky = prediction._continuum(one, 0.0).waves
+        squares = [np.sum(np.abs(amplitude) ** 2 / 2 * k**power) for k in (kx, ky) for power in (0, 2)]
+        line = one is bands or along == 0
+        assert squares == pytest.approx([moment(0), moment(2) * line, moment(0), moment(2) * (not line)], rel=1e-3)
+
+
+@pytest.mark.parametrize("grid", ["bands: {points: [4096, 1]}", "grid: {points: [128, 1], size: 1.0e-3}"])
+@pytest.mark.parametrize(
+    ("rough", "words"),
+    [
+        ("spectrum: psd.csv", "psd.csv: C2D is the spectrum of a surface, and the job has one row of points"),
+        (
+            "hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 2e-5, psd_constant: 1e-22",
+            "job.yaml:2:98: surface.psd_constant is the constant of a surface's spectrum [m^4], and one row of points",
+        ),
+    ],
+)
+def test_spectra_of_a_surface_are_of_no_profile(
+    tmp_path: Path, main: "Main", grid: str, rough: str, words: str
+) -> None:
+    """One line of points is refused: its heights would depend on the width of the box."""
+    (tmp_path / "psd.csv").write_text(table("q[1/m] C2D[m^4]", Q, c2(Q)))
+    text = re.sub("grid:.*", grid, JOB.format(more="")).replace("spectrum: psd.csv", rough)
+    (tmp_path / "job.yaml").write_text(text)
+    code, _, err = main("check", tmp_path / "job.yaml")
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+
+
 @pytest.mark.parametrize(("kind", "factor"), [("C1D[m^3]", np.pi), ("C2D[m^4]", 4 * np.pi**2)])
 def test_spectra_in_the_normalisation_of_surface_topography(tmp_path: Path, kind: str, factor: float) -> None:
     """Their values are pi and 4 pi^2 times ours: with the key the density is the same to rounding."""
     own = {"C1D[m^3]": c1, "C2D[m^4]": c2}[kind](Q)
     plain = load(tmp_path, table(f"q[1/m] {kind}", Q, own)).surface[0]
     assert isinstance(plain, jobs.RoughSpectrum)
-    expected = measured_maps.read_spectrum(plain)[0](Q)
+    expected = measured_maps.read_spectrum(plain, False)[0](Q)
     theirs = load(tmp_path, table(f"q[1/m] {kind}", Q, factor * own), ", normalisation: surface_topography").surface[0]
     assert isinstance(theirs, jobs.RoughSpectrum)
-    assert measured_maps.read_spectrum(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert measured_maps.read_spectrum(theirs, False)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("kind", ["C1D[m^3]", "C2D[m^4]"])
@@ -151,23 +212,24 @@ def test_spectra_that_surface_topography_writes(tmp_path: Path, main: "Main", ki
     assert float(found[2]) == pytest.approx(truth.rms_slope(made.astype(float), L), rel=1e-3, abs=0.0)
 
 
-def test_the_spectrum_of_line_scans() -> None:
+@pytest.mark.parametrize("line", [False, True])
+def test_the_spectrum_of_line_scans(line: bool) -> None:
     """Sixteen rows of an isotropic surface with waves of 40 to 250 um, 4 mm long: surfaces with their spectra have its
-    mean square height and slope to 15 %. Bins are 26 % wide, and values of Abel's integral that scatter makes negative
-    count as 0."""
+    mean square height and slope to 15 %, profiles half of this square slope. Bins are 26 % wide, and values of Abel's
+    integral that scatter makes negative count as 0."""
     heights = truth.rough(512, 4 * L, L / 4, L / 25, 0.05)
     part = jobs.Topography.model_construct(path=Path("line.npy"))
     found = []
     for row in heights[::32]:
-        density, ends = measured_maps.of_line(
-            part, map_files.Map(row[None] + np.linspace(0.0, 1e-5, 512), (4 * L, 4 * L))
+        density, ends = measured_maps.of_scan(
+            part, map_files.Map(row[None] + np.linspace(0.0, 1e-5, 512), (4 * L, 4 * L)), line
         )
         q = np.geomspace(2 * np.pi / ends[0], 2 * np.pi / ends[1], 4001)
-        weight = q**2 * density(q) / (2 * np.pi)
+        weight = q ** (2 - line) * density(q) / (2 * np.pi)
         found.append([np.trapezoid(weight, np.log(q)), np.trapezoid(q**2 * weight, np.log(q))])
     height, slope = np.mean(found, axis=0)
     assert height == pytest.approx(np.mean(heights**2), rel=0.15, abs=0.0)
-    assert slope == pytest.approx(0.05**2, rel=0.15)
+    assert slope == pytest.approx(0.05**2 / (1 + line), rel=0.15)
 
 
 @pytest.mark.parametrize("heights", [np.zeros(64), np.arange(16.0), np.linspace(0.0, 1.0, 64)])
@@ -175,7 +237,7 @@ def test_line_scans_that_give_no_spectrum(heights: Array) -> None:
     """Flat, short, or a straight line: one sentence."""
     part = jobs.Topography.model_construct(path=Path("line.npy"))
     with pytest.raises(InputError, match=r"line\.npy"):
-        measured_maps.of_line(part, map_files.Map(heights[None], (L, L)))
+        measured_maps.of_scan(part, map_files.Map(heights[None], (L, L)), False)
 
 
 @pytest.mark.mpi
@@ -219,7 +281,7 @@ def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
     amplitude, kx, ky = rings.waves
     power = np.abs(amplitude) ** 2 / 2
     q = np.geomspace(Q[0], Q[-1], 20001)
-    density = measured_maps.read_spectrum(part)[0](q) / (4 * np.pi**2)
+    density = measured_maps.read_spectrum(part, False)[0](q) / (4 * np.pi**2)
     for weight, own in ((1.0, power), (q**2, power * (kx**2 + ky**2))):
         assert own.sum() == pytest.approx(
             np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3, abs=0.0

@@ -172,7 +172,9 @@ def _rough(dice: Random, scale: Scale, directory: Path) -> Json:
     made |= {"long_wavelength": longest, "short_wavelength": shortest}
     if dice.random() < 0.3:
         made["rolloff_wavelength"] = dice.uniform(shortest, longest)
-    size = {"rms_slope": scale.slope, "rms_height": scale.height, "psd_constant": (scale.height * longest) ** 2}
+    size = {"rms_slope": scale.slope, "rms_height": scale.height}
+    if 1 not in scale.points:  # the constant of a surface
+        size["psd_constant"] = (scale.height * longest) ** 2
     name = dice.choice(list(size))
     return {**made, name: size[name], "amplitudes": dice.choice(["random", "fixed"])}
 
@@ -180,7 +182,8 @@ def _rough(dice: Random, scale: Scale, directory: Path) -> Json:
 def _spectrum(dice: Random, scale: Scale, directory: Path) -> Json:
     q = 2 * np.pi / scale.length * np.geomspace(0.5, 12.0, 20)
     c2 = (scale.height / q[2]) ** 2 * np.maximum(q / q[4], 1.0) ** (-2.0 * (1.0 + dice.uniform(0.3, 1.0)))
-    lines = ["q[1/m] C2D[m^4]", *(f"{k:.9g} {value:.9g}" for k, value in zip(q, c2, strict=True))]
+    kind = "C1D[m^3]" if 1 in scale.points else "C2D[m^4]"
+    lines = [f"q[1/m] {kind}", *(f"{k:.9g} {value:.9g}" for k, value in zip(q, c2, strict=True))]
     (directory / "psd.csv").write_text("\n".join(lines) + "\n")
     return {"shape": "rough", "spectrum": "psd.csv", "seed": dice.randint(0, 99)}
 
