@@ -287,7 +287,7 @@ class Cascade:
             0.0,
             np.sum([w * rung.powers for w, rung in zip(weights, rungs, strict=True)], axis=0),
             {name: mean(shares) @ np.array([rung.found[name] for rung in rungs]) for name, mean in self._means.items()},
-            np.array([*((loads * energy) @ errors[:, :3] / self.pressure), *(areas @ errors[:, 3:])]),
+            np.array([*(np.abs(loads * energy) @ errors[:, :3] / self.pressure), *(np.abs(areas) @ errors[:, 3:])]),
         )
 
     def hard(self, sample: int) -> Results:

@@ -93,6 +93,15 @@ def test_full_contact_is_the_closed_form(count: int) -> None:
     assert point.measures.contact_area == pytest.approx(1.0, abs=1e-5)  # of the interpolation between rungs
 
 
+def test_errors_of_full_contact_are_positive() -> None:
+    """Some rungs have weights below 0, as the interpolation is cubic; errors of rungs do not subtract."""
+    waves = {"hurst": 0.5, "long_wavelength": 6.28e-4, "short_wavelength": 3.14e-5, "rms_slope": 0.0055, "seed": 0}
+    surface, bands = {"shape": "rough", **waves}, {"count": 2, "points": [1024, 1], "samples": 1}
+    errors = sliding({"surface": surface, "bands": bands}).solve((0.1, 0.0), 1e6).errors
+    assert errors.friction is not None
+    assert min(*errors.friction, *errors.area) >= 0.0
+
+
 @pytest.mark.mpi(2, 3)
 def test_ranks_agree() -> None:
     """Whole contacts on other ranks: friction and area to the last digits but those of transforms."""
