@@ -248,7 +248,7 @@ def _means(line: Json, own: Json, reference: Json) -> Iterator[Json]:
     for row in own["rows"]:
         if not row["weight"] or not row.get("seen"):
             continue
-        budget = judge(properties, StepObservation(**{**row["seen"], "way": tuple(row["seen"]["way"])}))
+        budget = judge(properties, StepObservation(**row["seen"]))
         if not budget.resolved:
             continue
         for name, parts in (("friction", budget.friction), ("area", budget.area)):

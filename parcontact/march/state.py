@@ -170,6 +170,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep, change: float
         straight=measures.straight,
         friction_mismatch=mismatch,
         way=step.velocity,
+        position=(step.position[0] / grid.dx, step.position[1] / grid.dy),
         slid=_cells_slid(run, step, (grid.dx, grid.dy)),
         angle=pair.angle,
         curved=curved,

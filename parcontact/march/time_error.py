@@ -53,7 +53,7 @@ from typing import Any
 
 import numpy as np
 
-from ..job import Cylinder, Flat, Job, Rough, Wave
+from ..job import Cone, Cylinder, Flat, Job, Punch, Pyramid, Rough, Sphere, Wave
 from ..physics.prony import Prony, complex_modulus
 from ..physics.records import excess_of
 
@@ -102,6 +102,8 @@ TIME_AREA = Fit(
 EULER_AREA = Fit("area: the same of backward Euler", 0.18, 2.0, MARCHES, "1.1")
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
+SPOTS = Sphere | Cone | Pyramid | Punch  # shapes with one spot of contact, symmetric to its centre
+NEAR = 0.15  # accuracy: cells by which the centre of a symmetric shape may be off
 ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
 MANY_RADIUS = 0.7  # accuracy: least resolved radius or half width [cells] of many spots: more than single cells
 ONE_RADIUS = 1.3  # accuracy: the same of one spot, and of identical ones: more than five cells, or strips two wide
@@ -119,6 +121,8 @@ class RunProperties:
     * `measured`: the surface has a map, which may lack waves on a coarse grid;
     * `edges_follow_grid`: edges of contact are parallel to lines of the grid;
     * `identical_contacts`: all contacts are equal, like the contacts of a single wave;
+    * `centre`: centre of the only shape that is not flat, in cells from a point of the grid; None for other surfaces;
+    * `cells_slid`: distance that the surface slides in the whole history, in cells;
     * `free`: the box is free;
     * `prony`: relaxation function; None for an elastic body;
     * `folded`: bound on the error of folded branches;
@@ -131,6 +135,8 @@ class RunProperties:
     measured: bool = False
     edges_follow_grid: bool = False
     identical_contacts: bool = False
+    centre: Vector | None = None
+    cells_slid: float = math.inf
     free: bool = False
     prony: Prony | None = None
     folded: float = 0.0
@@ -159,7 +165,8 @@ class StepObservation:
     * `spared`: share of the box left out of the correction of the area, since points on the edge have yielded;
     * `straight`: 1 if all edges of contact follow one axis of the grid, 0 if they follow both axes equally;
     * `friction_mismatch`: friction by the slopes of the rigid surface minus friction by the slopes of the body;
-    * `way`: direction of sliding, (0, 0) at rest.
+    * `way`: direction of sliding, (0, 0) at rest;
+    * `position`: distance of the surface from its first position along x and y, in cells.
 
     Steps also have:
 
@@ -182,6 +189,7 @@ class StepObservation:
     straight: float = 0.0
     friction_mismatch: float = 0.0
     way: Vector = (0.0, 0.0)
+    position: Vector = (0.0, 0.0)
     difference: float = 0.0
     order: float = 2.0
     slid: float = 0.0
@@ -219,11 +227,35 @@ def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: 
         measured=shortest is not None,
         edges_follow_grid=line or _ridges(job.surface),
         identical_contacts=line or all(isinstance(shape, REGULAR) for shape in job.surface),
+        centre=centre_of(job),
+        cells_slid=sum(math.hypot(*_over(stage.velocity, cell)) * stage.seconds for stage in job.history),
         free=job.grid.boundary == "free",
         prony=prony,
         folded=folded,
         exponential=job.numerics.integrator != "backward-euler",
     )
+
+
+def _over(vector: Vector, cell: Vector) -> Vector:
+    return vector[0] / cell[0], vector[1] / cell[1]
+
+
+def centre_of(job: Job) -> Vector | None:
+    """Return the centre of the only shape of a surface that is not flat, in cells from a point of the grid; None for
+    other surfaces, and for a line of points."""
+    shapes = [shape for shape in job.surface if not isinstance(shape, Flat)]
+    if job.grid.is_line or len(shapes) != 1 or not isinstance(shapes[0], SPOTS):
+        return None
+    return _over(shapes[0].center or (job.grid.lx / 2, job.grid.ly / 2), (job.grid.dx, job.grid.dy))
+
+
+def is_symmetric(centre: Vector | None, position: Vector = (0.0, 0.0)) -> bool:
+    """Return True if a shape with this `centre_of` the job has the symmetry of the grid at its `position` [cells]: its
+    centre is on a line of points, or halfway between two, along both axes."""
+    if centre is None:
+        return False
+    halves = (2.0 * (start + moved) for start, moved in zip(centre, position, strict=True))
+    return all(abs(half - round(half)) <= 2.0 * NEAR for half in halves)
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:

@@ -48,17 +48,22 @@ def test_pull_off_of_a_sphere(tabor: float, points: int, box: float, exact: floa
 
 
 @pytest.mark.filterwarnings("ignore:adhesion")  # of cells longer than the process zone
-@pytest.mark.parametrize(("points", "most"), [(28, 4.0), (40, 4.0), (64, 8.0)])
-def test_the_error_of_a_pull_off_contains_the_range(points: int, most: float) -> None:
-    """Cells of 2, 1.4 and 0.9 process zones hold the edge of contact, which the area does not show: pull-offs are up to
-    30 % too large. The stated error covers it, and is at most some times as large."""
-    job = sphere(points, 2.6, 3.0, {"approach": 0.1 * LENGTH}, ramp(0.1 * LENGTH, -2.2 * LENGTH, 60))
+@pytest.mark.parametrize(
+    ("tabor", "points", "box", "most"),
+    [(3, 28, 2.6, 5), (3, 40, 2.6, 5), (3, 64, 2.6, 8), (1, 14, 4, 5), (1, 24, 6, 5)],
+)
+def test_the_error_of_a_pull_off_contains_the_range(tabor: float, points: int, box: float, most: float) -> None:
+    """Cells of 2, 1.4, 0.9, 0.7 and 0.6 process zones hold the edge of contact, which the area does not show: pull-offs
+    are up to 30 % too large, as the grid is symmetric to the sphere. The stated error covers it, and is at most some
+    times as large."""
+    deep = -2.2 if tabor == 3 else -3.0
+    job = sphere(points, box, tabor, {"approach": 0.1 * LENGTH}, ramp(0.1 * LENGTH, deep * LENGTH, 60))
     run = pc.Simulation(job)
     rows, names = list(run.steps()), ("time", "pressure", "max_pressure", "approach", "contact_area", "error_area")
     table = {name: [getattr(row, name) for row in rows] for name in names}
     ended: Any = SimpleNamespace(job=run.job, table=table, detached="")
     found = dict(swept(ended))
-    true = abs(found["pull_off"] - 1.54 * np.pi * WORK * RADIUS)
+    true = abs(found["pull_off"] - {1: 1.664, 3: 1.54}[tabor] * np.pi * WORK * RADIUS)
     assert true < found["pull_off_error"] < most * true
 
 

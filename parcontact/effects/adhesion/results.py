@@ -10,9 +10,10 @@ vertex of the parabola through these three points is below the lowest load by
 The vertex is the load of the pull-off. The error of this load is the sum of four parts: e; SOLVER times the tolerance
 of the solves; PULL_OFF times the median relative mesh error of the contact area up to this row; and ZONE times the
 fourth power of the ratio of a cell's side to the length of the process zone. The last part is due to coarse cells,
-which hold the edge of contact in its place. In tests, spheres were pulled off at seven rates with chosen steps, at
-accuracies from 0.1 to 0.005: all pull-offs differed from runs with 1500 equal steps by less than this error, even
-without its parts by the mesh.
+which hold the edge of contact in its place. The last two parts are multiplied by SYMMETRIC if the only shape has the
+symmetry of the grid, which then holds the edge on all sides at once. In tests, spheres were pulled off at seven rates
+with chosen steps, at accuracies from 0.1 to 0.005: all pull-offs differed from runs with 1500 equal steps by less than
+this error, even without its parts by the mesh.
 
 If the pull has no later row, if the contact snaps, or if it still exists at the end, the pull-off is the lowest load
 itself. Then the first part of the error is not e, but the difference between the lowest load and the load of the row
@@ -26,8 +27,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...march.budget import PULL_OFF
-from ...march.time_error import Fit
+from ...march.budget import PULL_OFF, SYMMETRIC
+from ...march.time_error import Fit, centre_of, is_symmetric
 from ...printed import quantity, with_error
 from ...results.results import Results
 
@@ -63,12 +64,12 @@ class PullOff(NamedTuple):
         return self.between - (SOLVER * tolerance + self.mesh) * self.pressure
 
 
-def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> list[PullOff]:
+def find(columns: Columns, detached: bool = False, coarseness: float = 0.0, symmetric: bool = False) -> list[PullOff]:
     """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach`,
     `contact_area` and `error_area`.
 
     `detached` is True if the run ended because its surfaces detached. `coarseness` is the side of a cell divided by the
-    length of the process zone.
+    length of the process zone. `symmetric` is True if the only shape has the symmetry of the grid.
 
     A pull is a range of rows in which the surfaces move apart. If contact is lost, the pull is the last such range
     before the loss. Otherwise the pull begins where the surfaces are closest. Rows after the loss of contact belong to
@@ -81,10 +82,10 @@ def find(columns: Columns, detached: bool = False, coarseness: float = 0.0) -> l
     last = len(area) if detached else len(area) - 1  # last row at which a contact may be lost
     pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
-    zone, found = ZONE.value * coarseness**ZONE.order, []
+    zone, coherent, found = ZONE.value * coarseness**ZONE.order, SYMMETRIC.value if symmetric else 1.0, []
     for pull in (pull for pull in pulls if pull.pressure < least[pull.row]):
         known = [error for error in columns["error_area"][: pull.row + 1] if error == error]
-        mesh = PULL_OFF.value * float(np.median(known)) + zone if known else math.nan
+        mesh = coherent * (PULL_OFF.value * float(np.median(known)) + zone) if known else math.nan
         found.append(pull._replace(mesh=mesh))
     return found
 
@@ -146,7 +147,8 @@ def _pulls(run: Results) -> list[PullOff]:
     from .effect import law_of  # slow to import, and for jobs with adhesion only
 
     law = law_of(run.job)
-    return find(run.table, bool(run.detached), law.cell / law.zone if law.zone else math.nan)
+    symmetric = is_symmetric(centre_of(run.job)) and not any(stage.speed for stage in run.job.history)
+    return find(run.table, bool(run.detached), law.cell / law.zone if law.zone else math.nan, symmetric)
 
 
 def sentences(run: Results) -> Iterator[str]:
