@@ -260,8 +260,8 @@ MEASURES: Table = (
     ERROR_AREA,
     Column(
         *("error_gap", ""),
-        "estimated relative error of `mean_gap`: the error of the area, relative to the open share; empty in full "
-        "contact, and where `error_area` is",
+        "estimated relative error of `mean_gap`: the error of the area, relative to the open share, and in a free box "
+        "the rise of the gap over half a cell; empty in full contact, and where `error_area` is",
     ),
     Column(
         *("error_energy", "J"),

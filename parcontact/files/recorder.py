@@ -78,10 +78,12 @@ class StepRow:
 
     @property
     def error_gap(self) -> float:
-        """Return the estimated relative error of the mean gap, which equals the relative error of the share of the
-        surface that is open. Return NaN in full contact, or if the error is unknown."""
-        area = self.measures.contact_area_corrected
-        return self.error_area * area / (1.0 - area) if area < 1.0 else math.nan
+        """Return the estimated relative error of the mean gap. This is the relative error of the share of the surface
+        that is open, in a free box plus `Measures.gap_by_edges`. Return NaN in full contact, or if the error is
+        unknown."""
+        area, gap = self.measures.contact_area_corrected, self.measures.mean_gap
+        by_edges = self.measures.gap_by_edges / gap if gap > 0.0 else 0.0
+        return self.error_area * area / (1.0 - area) + by_edges if area < 1.0 else math.nan
 
 
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:

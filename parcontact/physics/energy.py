@@ -404,7 +404,11 @@ class Probe:
             p, u, h, touching, regrid.before_first(self.slab, touching, along_y), along_x
         )
         edge = _touches_edge(self.slab, touching, self.surface.periodic)
-        load, count, gaps, sides_x, sides_y, largest, edge = self.slab.reduce(sums, [largest, edge])
+        at_edges = [] if all(self.surface.periodic) else _sum_edges(self.slab, u, h)
+        load, count, gaps, sides_x, sides_y, *at_edges, largest, edge = self.slab.reduce(
+            [*sums, *at_edges], [largest, edge]
+        )
+        by_edges = self._measure_edges(at_edges, gaps / points) if at_edges else 0.0
         unit_pressure = alpha * units.pressure
         sides = sides_x + sides_y
         excess, least = self._excess * sides, 0.0
@@ -435,6 +439,7 @@ class Probe:
             contact_area=count / points,
             approach=d * units.height - self.surface.datum,
             mean_gap=(gaps / points - d) * units.height,
+            gap_by_edges=by_edges * units.height,
             max_pressure=largest * unit_pressure,
             contact_area_corrected=corrected,
             at_edge=edge > 0.0,
@@ -444,6 +449,13 @@ class Probe:
             spared=(self._excess * sides - excess) / points,
             straight=self._straightness(sides_x, sides_y),
         )
+
+    def _measure_edges(self, sums: Sequence[float], mean: float) -> float:
+        """Return the error of the mean gap by the edges of a free box, from `_sum_edges` of all ranks."""
+        nx, ny = self.slab.nx, self.slab.ny
+        along = ((sums[:2], ny, nx), (sums[2:], nx, ny))
+        free = [one for one, cyclic in zip(along, self.surface.periodic, strict=True) if not cyclic]
+        return sum(_error_by_edges(*(edge / across for edge in edges), mean, n) for edges, across, n in free if n > 1)
 
     def _straightness(self, sides_x: float, sides_y: float) -> float:
         """Return how nearly all edges of contact follow one axis of the grid; the numbers of their cell sides are those
@@ -459,6 +471,21 @@ class Probe:
         found = loops.measure_yielded(p, u, h, above[0], below[0], along_x, (1.0 - YIELDED) * highest)
         sharp, sides, count, gaps = self.slab.sum(*found)
         return _Yielding(sharp + self._excess * sides, count, gaps)
+
+
+def _sum_edges(slab: Slab, u: Array, h: Array) -> list[float]:
+    """Return this rank's sums of `u - h` over the first and last points along x, and along y."""
+    first, last = slice(0, 1 if slab.rows.start == 0 else 0), slice(-1 if slab.rows.stop == slab.ny else len(u), None)
+    edges = (u[:, 0], h[:, 0]), (u[:, -1], h[:, -1]), (u[first], h[first]), (u[last], h[last])
+    return [float(np.sum(ours - theirs, dtype=np.float64)) for ours, theirs in edges]
+
+
+def _error_by_edges(first: float, last: float, mean: float, points: int) -> float:
+    """Return the error of a mean over this number of points along a free box, from the means of the gap at its first
+    and last points, and over the box. The last point is a cell before the end of the box, over which the gap rises as
+    in a paraboloid."""
+    rise = 6.0 * (0.5 * (first + last) - mean) / points
+    return 0.5 * (abs(last + rise - first) + abs(rise)) / points
 
 
 def _touches_edge(slab: Slab, touching: NDArray[Any], periodic: tuple[bool, bool]) -> float:

