@@ -169,6 +169,7 @@ def _advance(s, f, ds, df, theta, last):
 GAMMA = 4.0  # tuning: gamma over the ratio of the spreads of pressure and displacement of the start
 MAX_LEVELS = 20  # accuracy: limit on steps to the level of a start with the load; about five are usual
 LEVEL_EXCESS = 1.1  # tuning: load of that start over the given one at which the level is left
+LARGEST = 1e16  # rounding: gamma over the first one, above which it hides the pressures
 SLOW, FALL, LARGER = 500, 0.3, 16.0  # tuning: steps in which the rms of f must fall by a factor, or gamma is raised
 WORSE = 2.0  # tuning: rms of f over the least one, above which earlier changes are forgotten
 STALLED = 25  # tuning: limit on steps without a smaller rms of f
@@ -210,7 +211,8 @@ class Splitting:
         cold = self._begin(given, p)
         last = self._certify(given, p)
         gamma = self._gamma(p, self._y if cold else last.whole)
-        while last.certificate.worst > given.tolerance and steps < self.most:
+        highest = LARGEST * gamma
+        while last.certificate.worst > given.tolerance and steps < self.most and gamma < highest:
             _begin_split(p, last.whole, self._y, h, last.d, gamma, self._s)
             made, last = self._iterate(given, p, gamma, last, self.most - steps)
             steps, gamma = steps + made, LARGER * gamma

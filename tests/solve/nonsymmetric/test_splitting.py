@@ -236,6 +236,18 @@ def test_numbers_that_are_not_finite_end_a_solve(worst: float) -> None:
     assert found.iterations <= 1
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_solve_that_stalls_ends_before_its_numbers_overflow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tolerance of 0 is never met. Gamma is raised as often as steps are slow, but ends a solve when rounding hides
+    the pressures."""
+    splitting, _ = made(0.0)
+    splitting.most = 10**6
+    monkeypatch.setattr("parcontact.contact.splitting.SLOW", 1)
+    found = splitting.solve(HEIGHTS, MeanPressure(1.0), Box(), np.ones((N, N)))
+    assert found.failure
+    assert np.isfinite(found.p).all()
+
+
 def test_closings_that_fall_are_refused() -> None:
     with pytest.raises(InputError, match="do not fall"):
         InterfaceLaw.of_table(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
