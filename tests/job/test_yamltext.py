@@ -127,6 +127,7 @@ def test_names_of_jobs_that_no_file_can_have(name: str) -> None:
         (with_stage("{pressure: 1e300}"), "history.0.pressure must be from 1e-60 to 1e+60"),
         (with_stage("{pressure: 1, duration: 1e30, time_step: 1}"), "history.0.time_step leads to 1e+30 steps; a hist"),
         (SMALL + "steady: {velocities: [1], pressures: [5e-324]}\n", "steady.pressures.0 must be from 1e-60"),
+        (SMALL + "numerics: {accuracy: 5e-324}\n", "numerics.accuracy must be from 1e-60"),
     ],
 )  # fmt: skip
 def test_values_that_overflow_later(tmp_path: Path, text: str, sentence: str) -> None:
