@@ -295,6 +295,21 @@ def _outside(job: Sections) -> Iterator[Doubt]:
                 yield WARN_CENTRE_OUTSIDE(f"surface.{index}", {"axis": axis, "at": at, "length": length})
 
 
+WARN_SHORT_LINE = Kind(
+    "short line",
+    "in a free box one row of points is a strip of the width {width:g} m, with the same pressure across; it is a line "
+    "contact only if it is wider than long: give grid.size {length:g} m or more {across}",
+)
+
+
+def _short_line(job: Sections) -> Iterator[Doubt]:
+    """Yield a warning for a row or column of points in a free box that is less wide than long."""
+    axis = job.grid.points.index(1) if job.grid.is_line else 0
+    width, length = job.grid.size[axis], job.grid.size[1 - axis]
+    if job.grid.is_line and not job.grid.cyclic[axis] and width < length:
+        yield WARN_SHORT_LINE("grid", {"width": width, "length": length, "across": f"along {'xy'[axis]}"})
+
+
 WARN_LARGE_CONTACT = Kind(
     "large contact",
     "the contact would have a radius of {contact:.3g} m or more, above the radius of the sphere, {radius:g} m; the "
@@ -471,5 +486,5 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_outside, _room, neighbours, limits.doubt_needs),
+    *(_outside, _short_line, _room, neighbours, limits.doubt_needs),
 )

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import parcontact as pc
+from parcontact import job as jobs
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace as strip
@@ -50,6 +51,20 @@ def test_far_across_a_cell_acts_like_a_line() -> None:
     found = strip.strip_coefficients(np.array([[0.0, 0.05]]), y, lx / 2, ly / 1000, size=(lx, ly), poisson=0.5)
     line = 0.5 / np.pi * (lx / 2 * ly / 1000) / lx * np.log(ly / y)
     assert np.abs(found - line).max() < 1e-6 * line[0, 0]  # (dy/y)^2/24 is 2e-7
+
+
+@pytest.mark.filterwarnings("ignore:grid. in a free box")
+@pytest.mark.parametrize(("across", "within"), [(WIDTH, 0.03), (0.1 * WIDTH, 0.6)])
+def test_a_row_of_a_free_box_is_a_line_contact_if_it_is_wide(across: float, within: float) -> None:
+    """Hertz's peak pressure, 2 % too high under a strip as wide as the box is long. Under a narrower strip it is more
+    than a tenth too high, and the job gets a warning."""
+    grid = {"points": [1, 256], "size": [across, WIDTH], "boundary": "free"}
+    given = job([1, 256], grid=grid, history=[{"force": LINE_LOAD * across}])
+    peak = pc.Simulation(given, comm=MPI.COMM_SELF).run().max_pressure
+    wrong = peak / PEAK - 1.0
+    assert wrong == pytest.approx(0.0, abs=within)
+    warned = [doubt for doubt in jobs.load(given).doubts if "is a strip of the width" in str(doubt)]
+    assert len(warned) == (across < WIDTH) == (wrong > 0.1)
 
 
 @pytest.mark.parametrize("nx", [1, 8])
