@@ -290,8 +290,8 @@ def refuse_steady(section: str) -> Rule:
     """Return the rule that a job with the `section` cannot ask for steady sliding, as the effect of this section has a
     contact law of its own."""
 
-    def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-        for key in steady_sections(initial, steady) if given is not None else ():
+    def check(_: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+        for key in steady_sections(initial, steady):
             sentence = f"cannot be used with {section}: steady sliding is solved without its contact law"
             yield Fault(f"{sentence}; slide into the steady state with a stage of the history", (key,))
 
@@ -301,8 +301,8 @@ def refuse_steady(section: str) -> Rule:
 def refuse_bands_over_time(section: str) -> Rule:
     """Return the rule that a job with the `section` cannot have both bands and a history."""
 
-    def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-        if given is not None and bands is not None and history:
+    def check(_: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+        if bands is not None and history:
             yield Fault(
                 "cannot be used with bands and a history: give bands a steady section, or the history a grid",
                 (section,),

@@ -279,9 +279,7 @@ SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which
 Forces = tuple[Vector, Vector]  # before and after a step
 
 
-def _excluded(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
-    if adhesion is None:
-        return
+def _excluded(adhesion: Adhesion, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
     if material.hardness is not None:
         sentence = "cannot be used with adhesion: contacts that attract and yield are not solved; leave one of them out"
         yield Fault(sentence, ("material", "hardness"))
@@ -293,9 +291,9 @@ def _excluded(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -
     yield from limits.no_strip("adhesion", grid)
 
 
-def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
+def _zone_is_resolved(adhesion: Adhesion, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
     """Refuse viscoelastic bodies whose process zone the mesh does not resolve."""
-    if adhesion is None or grid is None or bands is not None or not material.fitted.branches:
+    if grid is None or bands is not None or not material.fitted.branches:
         return
     if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
         return

@@ -121,7 +121,7 @@ AT_REST = "it carries the roughness and sees a load at rest, so that in steady s
 
 def _slides(counterbody: Any, history: Any, initial: Any, steady: Any) -> Iterator[Fault]:
     """Refuse histories that slide on a counterbody that relaxes, and steady sliding in which it flows."""
-    if counterbody is None or not counterbody.fitted.remembers:
+    if not counterbody.fitted.remembers:
         return
     why = "needs an elastic counterbody: states of one that relaxes move with the surface, which is not solved for"
     for index, stage in enumerate(history):
@@ -137,25 +137,23 @@ def _slides(counterbody: Any, history: Any, initial: Any, steady: Any) -> Iterat
 
 
 def _sticks(counterbody: Any, material: Any, interface: Any) -> Iterator[Fault]:
-    if None not in (counterbody, interface) and interface.stick and _differ(material, counterbody):
+    if interface.stick and _differ(material, counterbody):
         sentence = f"needs counterbody.poisson of {material.poisson:g}, got {counterbody.poisson:g}"
         yield Fault(f"{sentence}: bodies share tractions and pressures in other proportions", ("interface", "stick"))
 
 
 def _no_heat(counterbody: Any, thermal: Any) -> Iterator[Fault]:
-    if None not in (counterbody, thermal):
-        sentence = "cannot be used with counterbody: losses in it heat it, too, which is not solved for"
-        yield Fault(f"{sentence}; leave one of them out", ("thermal",))
+    sentence = "cannot be used with counterbody: losses in it heat it, too, which is not solved for"
+    yield Fault(f"{sentence}; leave one of them out", ("thermal",))
 
 
 def _no_softening(counterbody: Any, softening: Any) -> Iterator[Fault]:
-    if None not in (counterbody, softening):
-        sentence = "cannot be used with counterbody: only the rubber softens, and factors would count for both bodies"
-        yield Fault(f"{sentence}; leave one of them out", ("softening",))
+    sentence = "cannot be used with counterbody: only the rubber softens, and factors would count for both bodies"
+    yield Fault(f"{sentence}; leave one of them out", ("softening",))
 
 
 def _does_not_yield(counterbody: Any) -> Iterator[Fault]:
-    if counterbody is not None and counterbody.hardness is not None:
+    if counterbody.hardness is not None:
         yield Fault("is a key of material, also with a counterbody: give it there", ("counterbody", "hardness"))
 
 

@@ -32,22 +32,22 @@ LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, an
 DECAYED = 10.0  # accuracy: duration of the memory of heat over the diffusion time of the longest wave
 
 
-def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
-    if thermal is not None and thermal.feedback != "none" and math.isnan(temperature_of(material)):
+def _shifts(thermal: Thermal, material: Any) -> Iterator[Fault]:
+    if thermal.feedback != "none" and math.isnan(temperature_of(material)):
         yield Fault(
             "needs a material whose relaxation times depend on temperature: give material a shift, or feedback: none",
             ("thermal", "feedback"),
         )
 
 
-def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
-    if thermal is not None and thermal.feedback != "none" and initial.state == "steady":
+def _no_warm_start(thermal: Thermal, initial: Any) -> Iterator[Fault]:
+    if thermal.feedback != "none" and initial.state == "steady":
         sentence = "cannot be used with thermal.feedback: the steady state would be that of cold rubber"
         yield Fault(f"{sentence}; slide into the steady state with a stage", ("initial",))
 
 
-def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
-    if thermal is None or thermal.counterbody is None:
+def _in_curves(thermal: Thermal, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
+    if thermal.counterbody is None:
         return
     if bands is not None:
         sentence = "cannot be used with bands, whose heat all goes into the rubber; leave it out"
@@ -62,8 +62,8 @@ def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) ->
         yield Fault(sentence, ("thermal", "counterbody"))
 
 
-def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
-    return limits.no_strip("thermal", grid) if thermal is not None else iter(())
+def _no_strip_of_heat(thermal: Thermal, grid: Grid) -> Iterator[Fault]:
+    return limits.no_strip("thermal", grid)
 
 
 class Counterbody(Part):

@@ -36,8 +36,6 @@ def _bell(velocity: float | None, width: float | None, coefficient: float | None
 
 
 def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
-    if interface is None:
-        return
     if interface.stick and abs(material.poisson - 0.5) > SAME:
         yield Fault(
             f"needs material.poisson of 0.5, got {material.poisson:g}: pressure on a compressible body moves its "
@@ -56,7 +54,7 @@ def _sticks(
     interface: Any, grid: Any, initial: Any, steady: Any, bands: Any, history: Any, output: Any
 ) -> Iterator[Fault]:
     """Refuse jobs with stick that are not solved for, and maps of tractions without stick."""
-    if interface is None or not interface.stick:
+    if not interface.stick:
         yield from (fault for check in OF_TRACTIONS for fault in check(output))
         return
     if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
@@ -75,7 +73,7 @@ def _sticks(
 
 def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
     """Refuse rolling without stick, of a rough surface, and in chosen steps."""
-    if interface is None or not interface.stick:
+    if not interface.stick:
         yield from limits.no_rolling(history)
         return
     rough = any(isinstance(shape, Rough | RoughSpectrum | Topography) for shape in surface)
@@ -88,7 +86,7 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
 
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
-    if None not in (interface, adhesion) and interface.coefficient is not None:
+    if interface.coefficient is not None:
         sentence = (
             "cannot be used with adhesion: pressures are negative at the edge of contact, and the contact pressure "
             "(pressure plus work/range) depends on the range; give a shear_stress"

@@ -361,10 +361,10 @@ def _is_thick_enough(body: Any, grid: Any) -> Iterator[Fault]:
     """Yield an error if a layer in a free box is thinner than two cells, or if a layer is too thin for its compliance
     to be a number above 0."""
     least, of_box = 2 * max(grid.dx, grid.dy), THINNEST * max(grid.size)
-    if body is not None and grid.boundary == "free" and body.thickness < least:
+    if grid.boundary == "free" and body.thickness < least:
         sentence = f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free"
         yield Fault(f"{sentence}, got {body.thickness:g}", ("body", "thickness"))
-    if body is not None and body.thickness < of_box:
+    if body.thickness < of_box:
         sentence = f"must be at least {THINNEST:g} of the box, {of_box:.3g} m, got {body.thickness:g}"
         yield Fault(sentence, ("body", "thickness"))
 
@@ -372,8 +372,6 @@ def _is_thick_enough(body: Any, grid: Any) -> Iterator[Fault]:
 def _has_a_kernel(body: Any, grid: Any, material: Any, initial: Any, steady: Any) -> Iterator[Fault]:
     """Yield an error for a box that is free along y only, and for steady sliding in a free box or of a body that
     flows."""
-    if body is None:
-        return
     yield from limits.no_strip("a layer (body)", grid)
     if grid.boundary == "free" and (initial.state == "steady" or steady is not None):
         yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
@@ -381,29 +379,23 @@ def _has_a_kernel(body: Any, grid: Any, material: Any, initial: Any, steady: Any
 
 
 def _no_bands(body: Any, bands: Any) -> Iterator[Fault]:
-    if None not in (body, bands):
+    if bands is not None:
         yield Fault("cannot be used with bands: a layer changes the coarsest waves only; give it a grid", ("body",))
 
 
 def _no_counterbody(body: Any, counterbody: Any) -> Iterator[Fault]:
-    if None not in (body, counterbody):
-        sentence = "needs a half space: the share of a layer depends on the wavelength"
-        yield Fault(f"{sentence}; leave out body, or counterbody", ("counterbody",))
+    sentence = "needs a half space: the share of a layer depends on the wavelength"
+    yield Fault(f"{sentence}; leave out body, or counterbody", ("counterbody",))
 
 
 def _no_stick(body: Any, interface: Any) -> Iterator[Fault]:
-    if None not in (body, interface) and interface.stick:
+    if interface.stick:
         sentence = "needs a half space: pressure on a layer moves its surface sideways, which is not solved for"
         yield Fault(f"{sentence}; leave out stick, or body {SMALL_CONTACT}", ("interface", "stick"))
 
 
 def _no_softening(body: Any, softening: Any) -> Iterator[Fault]:
-    if None not in (body, softening):
-        sentence = "cannot be used with softening: strains are those of a half space; leave one of them out"
-        yield Fault(sentence, ("body",))
-
-
-RULES = rules_of(_is_thick_enough, _has_a_kernel, _no_bands, _no_counterbody, _no_stick, _no_softening)
+    yield Fault("cannot be used with softening: strains are those of a half space; leave one of them out", ("body",))
 
 
 WARN_THIN = Kind(
@@ -504,7 +496,9 @@ class RubberLayer(Effect[None]):
     in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True  # all bands are refused
     lifts: ClassVar[tuple[Any, ...]] = (limits.steady_bodies_do_not_flow,)
-    rules: ClassVar[tuple[Rule, ...]] = RULES
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(
+        *(_is_thick_enough, _has_a_kernel, _no_bands, _no_counterbody, _no_stick, _no_softening)
+    )
     doubts = staticmethod(doubts_of_layer)
     doubt_heights = staticmethod(doubt_span)
 

@@ -155,14 +155,14 @@ class Leakage(Part):
         return next((ramp.end for ramp in given if ramp is not None), self.pressures)
 
 
-def _needs_steps(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
-    if leakage is not None and not leakage.total and not history:  # `_no_steady` refuses a curve with a load: total
+def _needs_steps(leakage: Leakage, history: Any) -> Iterator[Fault]:
+    if not leakage.total and not history:  # `_no_steady` refuses a curve with a load: total
         yield Fault("needs a history: the flow of a friction curve is not calculated", ("leakage",))
 
 
-def _stages(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
+def _stages(leakage: Leakage, history: Any) -> Iterator[Fault]:
     """Yield errors of the fluid's pressures in all stages, and of the directions in which stages slide."""
-    if leakage is None or any(stage is None for stage in history):
+    if any(stage is None for stage in history):
         return
     for number, stage in enumerate(history):
         ramp, place = stage.fluid_pressures, ("history", number, "fluid_pressures")
@@ -182,13 +182,13 @@ def _stages(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
             yield Fault(f"must begin with {was}, got {now}: a stage without duration makes a jump", place)
 
 
-def _no_free_box(leakage: Leakage | None, grid: Any) -> Iterator[Fault]:
-    if leakage is not None and leakage.total and not all(grid.cyclic):
+def _no_free_box(leakage: Leakage, grid: Any) -> Iterator[Fault]:
+    if leakage.total and not all(grid.cyclic):
         yield Fault("must be periodic with leakage.load: total: the seal is one of many", ("grid", "boundary"))
 
 
-def _refused(leakage: Leakage | None, material: Any, numerics: Any) -> Iterator[Fault]:
-    if leakage is None or not leakage.total:
+def _refused(leakage: Leakage, material: Any, numerics: Any) -> Iterator[Fault]:
+    if not leakage.total:
         return
     if material.hardness is not None:
         sentence = "cannot be used with leakage.load: total: a fluid between surfaces that yield is not solved for"
@@ -198,22 +198,21 @@ def _refused(leakage: Leakage | None, material: Any, numerics: Any) -> Iterator[
 
 
 def _excludes(section: str, why: str) -> Rule:
-    def check(leakage: Leakage | None, other: Any) -> Iterator[Fault]:
-        sticks = section != "interface" or getattr(other, "stick", False)
-        if leakage is not None and leakage.total and other is not None and sticks:
+    def check(leakage: Leakage, other: Any) -> Iterator[Fault]:
+        if leakage.total and (section != "interface" or other.stick):
             sentence = f"cannot be used with {section}{'.stick' * (section == 'interface')}: {why} is not solved for"
             yield Fault(f"{sentence}; leave one of them out, or give load: net", ("leakage", "load"))
 
     return Rule(("leakage", section), check)
 
 
-def _no_steady(leakage: Leakage | None, initial: Any, steady: Any) -> Iterator[Fault]:
-    if leakage is not None and leakage.total:
+def _no_steady(leakage: Leakage, initial: Any, steady: Any) -> Iterator[Fault]:
+    if leakage.total:
         yield from limits.refuse_steady("leakage").check(leakage, initial, steady)
 
 
-def _has_map(leakage: Leakage | None, output: Any) -> Iterator[Fault]:
-    if leakage is None or not leakage.total:
+def _has_map(leakage: Leakage, output: Any) -> Iterator[Fault]:
+    if not leakage.total:
         yield from limits.no_field["fluid_pressure"](output)
 
 

@@ -236,11 +236,9 @@ class Softening(Part):
         return self._made[1]
 
 
-def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
+def only_in_steady_sliding(softening: Softening, history: Any, initial: Any) -> Iterator[Fault]:
     """Yield an error for jobs with a history. The softened modulus `f G' + i g G''` is no Prony series, so that no
     relaxation function of the body in time is known."""
-    if softening is None:
-        return
     if history:
         sentence = (
             "cannot be used with softening, which is for friction curves (parcontact steady): softened moduli are no"
@@ -250,18 +248,16 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
         yield Fault("cannot be used with softening, as softened moduli are no Prony series; leave it out", ("initial",))
 
 
-def in_a_periodic_box(softening: Softening | None, grid: Any) -> Iterator[Fault]:
+def in_a_periodic_box(softening: Softening, grid: Any) -> Iterator[Fault]:
     """Yield an error for free boxes, since strains are known for waves in a periodic box only."""
-    if softening is not None and not all(grid.cyclic):
+    if not all(grid.cyclic):
         yield Fault(
             "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")
         )
 
 
-def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
+def of_rubber(softening: Softening, material: Any) -> Iterator[Fault]:
     """Yield an error for bodies that dissipate nothing or are compressible."""
-    if softening is None:
-        return
     if not material.fitted.branches:
         yield Fault(
             "needs a material that relaxes (model zener or dma): strains count where it dissipates", ("softening",)
