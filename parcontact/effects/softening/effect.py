@@ -215,11 +215,11 @@ class Softening(Part):
     _made: tuple[StrainTable, str] = PrivateAttr()
 
     def model_post_init(self, context: Any) -> None:
-        if self.table is not None:
+        if self.table:
             self._made = StrainTable(*zip(*self.table, strict=True)), ""
             return
         if self.path is None:
-            return  # `one_of` reports it
+            return  # refused
         try:
             self._made = read_sweep(self.path, self.reference_strain)
         except InputError as error:

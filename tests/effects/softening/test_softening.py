@@ -316,6 +316,7 @@ def test_partial_contact_in_bands_and_on_one_grid() -> None:
         ({"body": {"thickness": 1e-3}}, "body cannot be used with softening"),
         ({"material": {"model": "elastic", "shear_modulus": 1e6}}, "needs a material that relaxes"),
         ({"material": {**RUBBER, "poisson": 0.3}}, "must be at least 0.45 with softening"),
+        ({"softening": {"table": []}}, "at least two rows"),
         ({"softening": {"table": [[0.1, 1, 1]]}}, "at least two rows"),
         ({"softening": {"table": [[0.1, 1, 1], [0.01, 1, 1]]}}, "rising strains"),
         ({"softening": {}}, "softening"),
