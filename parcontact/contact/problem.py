@@ -100,6 +100,14 @@ LOAD_ROUNDING = 1e-14  # accuracy: tolerance on the load, as a share of it, set 
 SNAP = 1e-12  # accuracy: pressures within this share of the range of a bound are put on the bound
 
 
+def subtract_load(slab: Slab, box: Box, p: Array, excess: float, points: float) -> float:
+    """Subtract `excess`, a sum of pressures, in equal parts for a number of `points` from an admissible p; collective.
+    Return the sum of the result, limited to the bounds."""
+    p -= excess / points
+    box.project(p)
+    return slab.sum(float(p.sum()))[0]
+
+
 def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> None:
     """Scale an admissible p from its sum `load` to the wanted sum `total`; collective.
 

@@ -14,8 +14,10 @@ C subtracts the mean over the working set. One iteration is:
 3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction, and corrects for a last
    step that was not exact. beta is 0, so that t = z, if f falls much less along `z + beta t` than along z, or if the
    bounds cut off much of the last step.
-4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the hardness is far below the stiffness,
-   alpha is limited, so that few pressures change from one bound to the other.
+4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. In cold solves in free boxes, much load
+   that the lower bound has added is first removed by subtracting one pressure from all points: scaling would unload
+   spots to which nothing was added. If the hardness is far below the stiffness, alpha is limited, so that few pressures
+   change from one bound to the other.
 5. f must not rise. Otherwise the step is halved, and the direction is forgotten.
 
 The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
@@ -41,7 +43,7 @@ from ..physics.records import Certificate
 from . import kernels
 from .certificate import Iterate, certify, form_iterate
 from .preconditioner import ALL, ExtendedPreconditioner, Grids
-from .problem import Contact, Problem, Workspace, scale_to_load
+from .problem import Contact, Problem, Workspace, scale_to_load, subtract_load
 
 # tuning
 MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate
@@ -53,7 +55,7 @@ MAX_STEP_RATIO_FREE = 2.0  # the same in a free box, or with a `further` precond
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # iterations without a smaller certificate after which steps are exact
 LEAST_DESCENT = 0.5  # least slope along t over that along z; below it the last direction is forgotten
 REACH = 4.0  # largest change of a pressure in one step, over the highest admissible pressure
-LARGE_CUT = 0.003  # share of the load; if more is cut off, the direction is forgotten
+LARGE_CUT = 0.003  # share of the load that counts as much; if more is cut off, the direction is forgotten
 # accuracy
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of <p, A p>/2 below which a rise of f is rounding
 LEAST_LOAD = float(np.finfo(np.float64).tiny)  # least mean pressure that maps can represent; less counts as none
@@ -90,15 +92,16 @@ class ContactSolver:
         extended = ExtendedPreconditioner(self.slab, larger=grids)
         self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is far from the inverse
         self._extended = extended if further is None or self._rough_inverse else further(self.slab, extended)
+        self._free = free
         self._most_ratio = MAX_STEP_RATIO_FREE if free or further is not None else MAX_STEP_RATIO
 
-    def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
+    def solve(self, problem: Problem, start: Array, tolerance: float | None = None, cold: bool = False) -> Contact:
         """Solve a contact problem from the admissible pressure `start`, which is overwritten by the solution;
         collective.
 
         Under load control the start is scaled to the load, or replaced by a uniform pressure if it is 0 everywhere.
-        `tolerance` replaces the tolerance of the solver. If the tolerance is not reached, `failure` of the contact
-        states why, and the maps hold the last iterate.
+        `tolerance` replaces the tolerance of the solver. `cold` is True for a start of 0 or from a coarser grid. If the
+        tolerance is not reached, `failure` of the contact states why, and the maps hold the last iterate.
         """
         mean = problem.control.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
@@ -107,7 +110,7 @@ class ContactSolver:
         p, other = start, self.workspace.pressure
         iterate = self._begin(problem, p)
         best, slope, iteration = (np.inf, 0), 0.0, 0
-        exact = self._rough_inverse
+        exact, shifts = self._rough_inverse, cold and self._free and problem.constraint.highest == math.inf
         while True:
             members, excess, certificate = self._certify(problem, p, iterate)
             best = min(best, (certificate.worst, iteration))
@@ -121,7 +124,7 @@ class ContactSolver:
             unlike = not 1.0 / self._most_ratio < ratio < self._most_ratio
             exact |= unlike or iteration - best[1] > ITERATIONS_UNTIL_EXACT_STEPS
             usual = None if exact else STEP + (1.0 - STEP) * (members / self.slab.points) ** 3
-            iterate, cut = self._descend(problem, p, iterate, usual, slope, other)
+            iterate, cut = self._descend(problem, p, iterate, usual, slope, members if shifts else 0.0, other)
             p, other = other, p
             iteration += 1
             exact |= cut == math.inf
@@ -199,10 +202,11 @@ class ContactSolver:
         return r_z + beta * r_t, ratio
 
     def _descend(
-        self, problem: Problem, old_p: Array, old: Iterate, usual: float | None, slope: float, p: Array
+        self, problem: Problem, old_p: Array, old: Iterate, usual: float | None, slope: float, sharing: float, p: Array
     ) -> tuple[Iterate, float]:
         """Make a step of length `usual`, or the exact step if it is None, from `old_p` to p. The old displacement is
-        kept in the other displacement of the workspace.
+        kept in the other displacement of the workspace. `sharing` is the number of points from which much load that the
+        lower bound adds is subtracted in equal parts, or 0 to scale pressures only.
 
         Return the new iterate and the share of its load that was cut off at the bounds, infinite if the step was
         halved.
@@ -216,7 +220,10 @@ class ContactSolver:
             sums = kernels.advance(old_p, work.direction, step, box.lowest, box.highest, p)
             load, cut = self.slab.sum(*sums)
             if mean is not None:
-                scale_to_load(self.slab, box, p, load, mean * self.slab.points)
+                total = mean * self.slab.points
+                if sharing and cut > LARGE_CUT * load:
+                    load = subtract_load(self.slab, box, p, load - total, sharing)
+                scale_to_load(self.slab, box, p, load, total)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()
             new = form_iterate(self.slab, box, p, work.displacement, problem.heights, old.d)

@@ -184,7 +184,8 @@ class OnTheseTiles:
             _bury(heights, tiles, lowest - self._height)
             solver, self._operator, inverse = self._solver_on(tiles, tolerance)
             control = _on_part(problem.control, slab.points / solver.slab.points)
-            contact = solver.solve(Problem(self._operator, inverse, heights, problem.constraint, control), start)
+            there = Problem(self._operator, inverse, heights, problem.constraint, control)
+            contact = solver.solve(there, start, cold=True)
             return contact.p, contact.d, contact.certificate.length
 
         self._stacked, d, length = on_root(slab.comm, act)
@@ -332,7 +333,8 @@ class _Descent:
             return p
         calls = self._tally["operator"]
         coarse, operators = self._solver_on(level.slab, max(LOOSE, self._solver.tolerance))
-        contact = coarse.solve(replace(self._problem, **operators._asdict(), heights=level.heights), p)
+        there = replace(self._problem, **operators._asdict(), heights=level.heights)
+        contact = coarse.solve(there, p, cold=True)
         if self._on_tiles is not None:
             if is_block_grid(level.slab, self._solver.slab):
                 self._blocks = level.slab, operators
@@ -522,7 +524,7 @@ def _attempts(
         contact = solver.solve(problem, p)
         yield "an operator in double precision", contact
     grids, _ = start_on_coarse_grids(solver, problem, p, solver_on)
-    contact = solver.solve(problem, p)
+    contact = solver.solve(problem, p, cold=True)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
     if np.isfinite(contact.certificate.worst):
         yield "sets of points", solve_by_sets(solver, problem, p)

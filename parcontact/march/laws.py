@@ -213,10 +213,10 @@ class DryLaw:
         if isinstance(control, MeanPressure) and not problem.constraint.admits(control.value):
             raise _out_of_bounds(scene, step, problem.constraint, control.value, trial.alpha * scene.units.pressure)
         make_start(scene, past.pressures, step, trial.alpha, past.spare)
-        if past.last.alpha == 0.0:  # nothing has been solved before
+        if cold := past.last.alpha == 0.0:  # nothing has been solved before
             on = partial(solver_on, scene.setup)
             contact = starts.prepare_start(scene.solver, problem, past.spare, on, solver_on_tiles(scene.setup))
-        contact = contact or scene.solver.solve(problem, past.spare, tolerance=tolerance)
+        contact = contact or scene.solver.solve(problem, past.spare, tolerance, cold)
         if contact.failure:
             contact, remark = self._retry(step, past, problem, contact)
         return SolvedContact(contact, None, problem.constraint.touches(contact.p), remark=remark)

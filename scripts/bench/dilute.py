@@ -61,7 +61,8 @@ class Dilute(Cold):
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
         contact = starts.prepare_start(own, self.problem(operators), start, coarse, self.on_tiles)
-        return np.asarray((self.solve_from(solver, start) if contact is None else contact).p)
+        contact = contact or own.solve(self.problem(operators), start, cold=True)
+        return np.asarray(contact.p)
 
     def counted(self, solver: Solver, error: float) -> Iterator[Line]:
         """Yield the operator calls of a solve, and its error."""

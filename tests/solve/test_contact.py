@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from parcontact.contact import starts
-from parcontact.contact.problem import Approach, MeanPressure, Operators
+from parcontact.contact.problem import Approach, Box, MeanPressure, Operators
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
@@ -185,6 +185,41 @@ def test_calls_in_a_box_with_nothing_around(load: float) -> None:
     found = keep(solving.solve(h, MeanPressure(load), p))
     assert np.linalg.norm(found.p - exact.p) <= 1e-5 * np.linalg.norm(exact.p)
     assert solving.slab.tally["operator"] - before <= 25
+
+
+def cold_and_not(boundary: str, constraint: Box, control: MeanPressure | Approach) -> tuple[list[Any], list[int]]:
+    """Pressures under a ball and operator calls, of a solve that is named cold and of one that is not, from 0."""
+    x = (np.arange(64) + 0.5) / 64 - 0.5
+    h, pressures, calls = -2.0 * np.add.outer(x**2, x**2), list[Any](), list[int]()
+    bench = solver(h, boundary=boundary)
+    bench.constraint = constraint
+    for cold in (True, False):
+        before = bench.slab.tally["operator"]
+        contact = bench.solver.solve(bench.problem(h, control), np.zeros_like(h), cold=cold)
+        assert contact.converged
+        calls.append(bench.slab.tally["operator"] - before)
+        pressures.append(contact.p.copy())
+    return pressures, calls
+
+
+def test_cold_solves_in_free_boxes_take_fewer_calls() -> None:
+    """The same pressure within ten times the tolerance."""
+    (p, expected), (calls, usual) = cold_and_not("free", Box(), MeanPressure(0.02))
+    assert calls < usual
+    assert_allclose(p, expected, atol=1e-5 * expected.max())
+
+
+@pytest.mark.parametrize(
+    ("boundary", "constraint", "control"),
+    [
+        ("periodic", Box(), MeanPressure(0.02)),
+        ("free", Box(), Approach(0.05)),
+        ("free", Box(highest=0.5), MeanPressure(0.02)),
+    ],
+)
+def test_other_cold_solves_are_as_all(boundary: str, constraint: Box, control: MeanPressure | Approach) -> None:
+    """To the last bit: in a box that repeats, under a given approach, and with a hardness."""
+    assert np.array_equal(*cold_and_not(boundary, constraint, control)[0])
 
 
 # -- the safeguard -----------------------------------------------------------------------------------------------------

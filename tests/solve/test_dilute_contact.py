@@ -147,7 +147,8 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
     found = []
 
     def on(_: Tiles, __: float) -> Any:
-        def solve(problem: Problem, start: Array) -> Any:
+        def solve(problem: Problem, start: Array, cold: bool) -> Any:
+            assert cold
             found.append(problem.heights.reshape(2, 2, 32, 32).transpose(0, 2, 1, 3).reshape(64, 64))
             return SimpleNamespace(p=start, d=0.0, certificate=SimpleNamespace(length=1.0))
 

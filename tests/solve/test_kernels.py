@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from parcontact.contact import kernels
-from parcontact.contact.problem import Box, scale_to_load
+from parcontact.contact.problem import Box, scale_to_load, subtract_load
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 
@@ -118,3 +118,12 @@ def test_scale_to_load(box: Box, share: float, dtype: type[np.floating]) -> None
     p.fill(box.lowest)
     scale_to_load(slab, box, p, float(p.sum()), total)
     np.testing.assert_allclose(p, total / slab.points, rtol=1e-14)
+
+
+@pytest.mark.parametrize("lowest", [0.0, 0.3])
+def test_subtract_load(lowest: float, dtype: type[np.floating]) -> None:
+    """All points lose the same, but none falls below the bound: what such points keep is too much in the sum."""
+    p = np.array([[1.0, 2.0], [0.25, 0.0]], dtype) + dtype(lowest)
+    load = subtract_load(Slab.alone(2, 2), Box(lowest=lowest), p, 1.5, 3.0)
+    np.testing.assert_allclose(p, np.array([[0.5, 1.5], [0.0, 0.0]]) + lowest, rtol=1e-6)
+    assert load == pytest.approx(2.0 + 4 * lowest, rel=1e-6)
