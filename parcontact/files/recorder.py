@@ -79,7 +79,7 @@ class StepRow:
     @property
     def error_gap(self) -> float:
         """Return the estimated relative error of the mean gap. This is the relative error of the share of the surface
-        that is open, in a free box plus `Measures.gap_by_edges`. Return NaN in full contact, or if the error is
+        that is open; in a free box `Measures.gap_by_edges` is added. Return NaN in full contact, or if the error is
         unknown."""
         area, gap = self.measures.contact_area_corrected, self.measures.mean_gap
         by_edges = self.measures.gap_by_edges / gap if gap > 0.0 else 0.0

@@ -296,9 +296,10 @@ def _asks_for(case: Case, section: str) -> bool:
 
 
 def sweep_errors(cases: Sequence[Case]) -> dict[str, dict[int, float]]:
-    """Return the largest error of each finished case by the number of the case, for friction, area and loss.
+    """Return the largest errors of the finished cases. The result maps the name of a quantity (friction, area and loss)
+    to a mapping from the number of a case to the largest error of this quantity in the case.
 
-    Without a slide the error of the area is the one of its last value, as in the table of the sweep.
+    If the cases do not slide, the error of the area is that of its last value, as in the table of the sweep.
     """
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     slides = any("mu_dyn" in row or "friction" in row for row in rows)

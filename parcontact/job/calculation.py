@@ -85,7 +85,8 @@ class Grid(Part):
 
     @property
     def is_line(self) -> bool:
-        """Return True for one row or column of points, on which surfaces are profiles; False for a single point."""
+        """Return True if the grid is one row or one column of points, so that surfaces on it are profiles. Return False
+        for a single point."""
         return (self.nx == 1) != (self.ny == 1)
 
     @property

@@ -88,7 +88,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
 
 
 def constants_are_of_surfaces(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
-    """Yield errors for constants of a surface's spectrum [m^4] on one row or column of points."""
+    """Yield an error if a roughness on one row or column of points is given by the constant [m^4] of a surface's
+    spectrum."""
     points = grid.points if bands is None else getattr(bands, "points", None) or ()
     if 1 not in points:
         return

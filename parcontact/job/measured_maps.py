@@ -236,9 +236,9 @@ FORMS = "q[1/m] C2D[m^4] or q[1/m] C1D[m^3] (or mm, um, nm)"
 
 @dataclass(frozen=True)
 class MeasuredSpectrum:
-    """The spectrum of an isotropic surface or of a profile: its density `phi` [m^4 or m^3] at rising wavenumbers `q`
-    [rad/m], both of shape (n,). Beyond the last wavenumber it falls with the power -`fall` of q, or is 0 if `fall` is
-    0."""
+    """The spectrum of an isotropic surface or of a profile. `phi` is its density [m^4 for a surface, m^3 for a profile]
+    at rising wavenumbers `q` [rad/m], both of shape (n,). Beyond the last wavenumber the density falls with the power
+    -`fall` of q, or is 0 if `fall` is 0."""
 
     q: Array
     phi: Array
@@ -255,7 +255,8 @@ class MeasuredSpectrum:
 
 def read_spectrum(part: RoughSpectrum, line: bool) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """Return the spectrum of a job's surface, or of a profile if `line` is True, and its longest and shortest
-    wavelengths [m]. Raises InputError, also for the C2D of a surface if `line` is True."""
+    wavelengths [m]. Raises InputError for an unreadable table. If `line` is True, a table of C2D, which belongs to a
+    surface, also raises InputError."""
     q, values, power = _read(part.spectrum)
     if part.normalisation == "surface_topography":
         values = values / LARGER[power]
