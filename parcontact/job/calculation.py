@@ -90,6 +90,17 @@ class Grid(Part):
         return (self.nx == 1) != (self.ny == 1)
 
     @property
+    def longest_side(self) -> float:
+        """Length of the box [m], the longer one; on a line of points that along the line."""
+        return max(size for size, n in zip(self.size, self.points, strict=True) if n > 1 or not self.is_line)
+
+    @property
+    def longest_cell(self) -> float:
+        """Length of a cell [m], the longer one; on a line of points that along the line."""
+        cells = zip((self.dx, self.dy), self.points, strict=True)
+        return max(cell for cell, n in cells if n > 1 or not self.is_line)
+
+    @property
     def nx(self) -> int:
         return self.points[0]
 

@@ -75,8 +75,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
             sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), {got}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         given = isinstance(shape, Rough | RoughSpectrum | Topography) and shape.short_wavelength
-        if given and given > max(grid.size):
-            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {given!r}"
+        if given and given > grid.longest_side:
+            sentence = f"must fit into the box of {grid.longest_side:.6g} m, got {given!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         elif isinstance(shape, Rough) and not has_wave(grid, shape.short_wavelength, shape.long_wavelength):
             sentence = f"must leave a wave of the grid down to short_wavelength, {shape.short_wavelength:g} m, but has "

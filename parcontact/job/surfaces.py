@@ -369,7 +369,7 @@ Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnySha
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
     """Return the wavenumber [rad/m] of a wave, or the lowest and the highest wavenumber of another shape. Return () for
     a flat surface. Round shapes and files may have every wave from the length of the box to that of two cells."""
-    longest = 2.0 * math.pi / max(grid.size)
+    longest = 2.0 * math.pi / grid.longest_side
     cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
     if isinstance(shape, Flat):
         return ()

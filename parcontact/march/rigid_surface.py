@@ -180,13 +180,12 @@ def _random_surface(
 ) -> Spectrum:
     """Return the transform of a random surface with a measured spectrum between its longest and shortest wavelengths
     [m], and add to the notes on root; collective."""
-    cells = (length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
-    (long, short), cell = ends, max(cells, default=max(grid.size))
+    (long, short), cell = ends, grid.longest_cell
     if fft.slab.root:
         if short < 2 * cell:
             notes.append(f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m")
-        if long > max(grid.size) * (1.0 + ROUNDING):
-            notes.append(f"spectrum: the box has no waves longer than {max(grid.size):.4g} m")
+        if long > grid.longest_side * (1.0 + ROUNDING):
+            notes.append(f"spectrum: the box has no waves longer than {grid.longest_side:.4g} m")
     limits = long, long, short * (1.0 - ROUNDING)  # the last point of a table is among its waves
     return Roughness(1.0, *limits, seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
 

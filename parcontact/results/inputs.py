@@ -104,7 +104,8 @@ def _spectra(sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], of: A
         drawn = power > ROUNDING * power.max(initial=0.0)
         lines.append(Line(label, q[drawn], power[drawn], style.line(number)))
         seen += power[drawn].tolist()
-    cell = max(length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True))
+    cells = [length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True) if n > 1]
+    cell = max(cells, default=max(sketch.size))
     ends = np.array([min(seen, default=1.0), max(seen, default=1.0)])
     for cells, dashes in ((RESOLVED, ":"), (2, "--")):
         at = np.full(2, 2 * np.pi / (cells * cell))
@@ -142,12 +143,11 @@ def describe_surface(
     own = measured or found  # a measured map at its own points, which no mirror has made twice as long
     *heights_and_slopes, (name, hurst) = list_statistics(replace(found, hurst=own.hurst, hurst_error=own.hurst_error))
     yield from (f"{one:15}{text}" for one, text in heights_and_slopes)
-    longest, two_cells = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
+    longest, two_cells = job.grid.longest_side, 2.0 * job.grid.longest_cell
     yield f"spectrum       waves of {quantity(longest, 'm', 4)} to {quantity(two_cells, 'm', 4)}"
     yield f"{name:15}{hurst}"
     if shortest is not None:
-        cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
-        yield f"shortest wave  {quantity(shortest, 'm', 4)}, {cells:.3g} cells"
+        yield f"shortest wave  {quantity(shortest, 'm', 4)}, {shortest / job.grid.longest_cell:.3g} cells"
     yield f"picture: {picture}"
 
 

@@ -290,7 +290,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
         raise InputError(ONE_ROUGH)
     if isinstance(part, jobs.RoughSpectrum):
         return rings_of_measured(job, part, slide)
-    longest = min(part.long_wavelength, max(job.grid.size))
+    longest = min(part.long_wavelength, job.grid.longest_side)
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
     unit = _rings_on_grid(job, shape.density, (k_long, k_short), slide, (k_rolloff,))
@@ -311,8 +311,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
     from ..job import measured_maps
 
     found, (long, short) = measured_maps.read_spectrum(part, job.grid.is_line)
-    cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
-    ends = 2 * np.pi / min(long, max(job.grid.size)), 2 * np.pi / max(short, 2 * cell)
+    ends = 2 * np.pi / min(long, job.grid.longest_side), 2 * np.pi / max(short, 2 * job.grid.longest_cell)
     if ends[0] >= EDGE * ends[1]:
         raise InputError("surface: the theory needs waves that fit the box and the grid, the spectrum has none")
     kinks = found.q[(found.q > ends[0]) & (found.q < ends[1])].tolist()

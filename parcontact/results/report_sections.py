@@ -202,7 +202,7 @@ def _lengths(job: Job) -> list[tuple[str, str]]:
         return [("waves of the surface", write_span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
     waves = ([getattr(part, f"{end}_wavelength", None) for end in ("long", "short")] for part in job.surface)
     rows = [("waves of the surface", write_span([end for end in each if end], "m")) for each in waves if all(each)]
-    return [*rows, ("cell of the grid", quantity(max(job.grid.dx, job.grid.dy), "m"))]
+    return [*rows, ("cell of the grid", quantity(job.grid.longest_cell, "m"))]
 
 
 def _moduli(job: Job, band: tuple[float, float]) -> tuple[float, float]:

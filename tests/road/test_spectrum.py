@@ -149,6 +149,21 @@ def test_a_table_of_profiles_on_one_line_of_points(tmp_path: Path, along: int, w
         assert squares == pytest.approx([moment(0), moment(2) * line, moment(0), moment(2) * (not line)], rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    "rough", ["spectrum: psd.csv", "hurst: 0.8, long_wavelength: 5e-3, short_wavelength: 2e-5, rms_slope: 0.1"]
+)
+def test_a_wide_row_of_points_has_waves_along_it_only(tmp_path: Path, main: "Main", rough: str) -> None:
+    """Waves of a row that is wider than long are not longer than the row: in the theory, and in what is printed."""
+    q = np.geomspace(1e3, 2e5, 30)
+    (tmp_path / "psd.csv").write_text(table("q[1/m],C1D[m^3]", q, 1e-10 * q**-2.0))
+    text = re.sub("grid:.*", "grid: {points: [256, 1], size: [1.0e-3, 1.0e-2]}", JOB.format(more=""))
+    (tmp_path / "job.yaml").write_text(text.replace("spectrum: psd.csv", rough))
+    kx = prediction._continuum(jobs.load(tmp_path / "job.yaml"), 0.0).waves.kx
+    assert 2.0 * np.pi / 1e-3 < kx.min() < 2.0 * np.pi / 0.9e-3
+    _, out, _ = main("surface", tmp_path / "job.yaml", "--out", tmp_path / "row.png")
+    assert "waves of 1 mm to 7.81" in out
+
+
 @pytest.mark.parametrize("grid", ["bands: {points: [4096, 1]}", "grid: {points: [128, 1], size: 1.0e-3}"])
 @pytest.mark.parametrize(
     ("rough", "words"),
