@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import parcontact
+from parcontact.bands.choice import cut_bands, doubts_of_bands
 from parcontact.job import Job, meaning
 from parcontact.march.rigid_surface import WARN_FLAT_MAP
 from parcontact.march.sanity import WARN_CELLS, WARN_SEAM
@@ -69,6 +70,28 @@ def test_a_box_as_large_as_advised_gets_no_advice(wave: float) -> None:
     larger, finer = {**data, "grid": {"points": 64, "size": float(size)}}, {**rough, "long_wavelength": float(longest)}
     assert Job.model_validate(larger).doubts == ()
     assert Job.model_validate({**data, "surface": finer}).doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("points", "velocity", "warns"),
+    [
+        ([1, 64], [0.1, 0.0], True),
+        ([1, 64], [0.1, 0.1], False),
+        ([64, 1], [0.1, 0.0], False),
+        ([64, 1], [0.0, 0.1], True),
+    ],
+)
+def test_ridges_along_the_sliding_have_no_friction(points: list[int], velocity: list[float], warns: bool) -> None:
+    """On a grid, and in bands."""
+    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2e-4, "short_wavelength": 1e-4, "rms_slope": 0.1}
+    elastic = {"model": "elastic", "shear_modulus": 1e6}
+    slide = {"pressure": 1e4, "velocity": velocity, "distance": 1e-5}
+    on_a_grid = {"grid": {"points": points, "size": 1e-3}, "history": [slide]}
+    in_bands = {"bands": {"points": points}, "steady": {"velocities": [0.1], "pressures": [1e4], "direction": velocity}}
+    for asked in (on_a_grid, in_bands):
+        job = Job.model_validate({"surface": rough, "material": elastic, **asked})
+        found = job.doubts if "grid" in asked else doubts_of_bands(job, cut_bands(job))
+        assert ["consists of ridges along" in str(doubt) for doubt in found].count(True) == warns
 
 
 def test_jobs_are_not_asked_for_keys_that_they_give(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from ..job.advice import fast_length
 from ..job.calculation import LEAST_CELLS, Bands
 from ..job.limits import doubt_memory
 from ..job.listing import answers
+from ..job.meaning import doubt_ridges
 from ..job.measured_maps import prepare
 from ..job.parts import AUTO
 from ..march import rigid_surface
@@ -336,4 +337,5 @@ def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> l
     """Return warnings about a job in bands: about the job itself, unmeasured frequencies, and steep waves."""
     whole = on_one_grid_of_all(job, cut)
     of_map = cut.measured.doubts if cut.measured else ()
-    return [*job.doubts, *of_map, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]
+    ridges = doubt_ridges("bands.points", cut.points, job.directions)
+    return [*job.doubts, *of_map, *ridges, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]

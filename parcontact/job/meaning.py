@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import Doubt, Kind
 from ..rubber.shift import doubt_kelvin
 from . import limits
-from .advice import Sections, doubts_of_resolution
+from .advice import Sections, Vector, doubts_of_resolution
 from .calculation import Grid
 from .materials import Elastic, PronyBranch, Zener, heated
 from .stages import Stage, Swing
@@ -273,6 +273,26 @@ def _band(job: Sections) -> Iterator[Doubt]:
         yield WARN_ELASTIC("material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
 
 
+WARN_ALONG_RIDGES = Kind(
+    "along ridges",
+    "with one point along {axis} the surface consists of ridges along {axis}, and the body has no friction in sliding "
+    "along them; give several points along {axis}",
+)
+
+
+def doubt_ridges(key: str, points: tuple[int, int], directions: list[Vector]) -> Iterator[Doubt]:
+    """Yield a warning, on a `key` of a job, for a surface on a line of `points` that slides across this line only.
+    `directions` are unit vectors."""
+    if (points[0] == 1) != (points[1] == 1) and directions:
+        axis = points.index(1)
+        if not any(way[1 - axis] for way in directions):
+            yield WARN_ALONG_RIDGES(key, {"axis": "xy"[axis]})
+
+
+def _ridges(job: Sections) -> Iterator[Doubt]:
+    yield from doubt_ridges("grid.points", job.grid.points, job.directions)
+
+
 # -- isolated contacts ------------------------------------------------------------------------------------------------
 
 
@@ -486,5 +506,5 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_outside, _short_line, _room, neighbours, limits.doubt_needs),
+    *(_ridges, _outside, _short_line, _room, neighbours, limits.doubt_needs),
 )
