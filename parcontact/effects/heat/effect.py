@@ -154,8 +154,7 @@ def _pulls(job: Any) -> bool:
 
 def feeds_back(job: Any) -> bool:
     """Return True if the heat of sliding changes the relaxation times of a job's material."""
-    section = job.section("thermal")
-    return section is not None and section.feedback != "none"
+    return bool(job.section("thermal").feedback != "none")
 
 
 class ThermalColumns(Effect[ThermalMemory]):
