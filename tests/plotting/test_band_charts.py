@@ -77,6 +77,8 @@ def test_no_legend_lies_on_bars(bars: bool) -> None:
     if bars:
         axes.bar([0.0, 1.0], [1.0, 1.0])
     (below,) = style.place_legends([[axes]])
-    top = axes.get_legend().get_window_extent().y1
+    legend = axes.get_legend()
+    assert legend is not None
+    top = legend.get_window_extent().y1
     assert (below > 0.0) == bars
     assert (top < axes.bbox.y0) == bars

@@ -306,7 +306,7 @@ def test_curves_are_compared_by_what_differs_among_them(tmp_path: Path, drawn: l
     pair = tmp_path / "two", tmp_path / "one"
     assert asked(*pair, "--compare", "--out", tmp_path / "both.png") == 0
     assert entries(drawn[0]) == ["two", "one", "10 °C", "40 °C"]
-    marks = [line.get_marker() for line in drawn[0].axes[0].get_lines() if len(line.get_xdata()) == 2]
+    marks = [line.get_marker() for line in drawn[0].axes[0].get_lines() if np.size(line.get_xdata()) == 2]
     assert marks == ["o", "s", "s"]
 
 
