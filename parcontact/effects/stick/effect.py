@@ -45,7 +45,7 @@ the trapezoidal rule may give a negative loss, which is replaced by 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -60,6 +60,7 @@ from ...physics.body import BodyMemory, MovedHeights, surface_of
 from ...physics.energy import EnergyMemory, Pressed
 from ...physics.records import Entry, Measures, Saved, Units
 from ...physics.surface import Vector
+from ...printed import quantity
 from ..effect import Changes, Instant, Sheared
 from ..interface.effect import InterfaceEffect, shares
 from . import solver
@@ -244,6 +245,10 @@ class StickSlip(InterfaceEffect[StickMemory]):
         slipping = self._slipping if instant.slid and power > 0.0 else bound
         sheared = Sheared(_with_force(instant, force), force, loss, slipping, error, share, time, mesh)
         return sheared, mean, round(stuck) / self._slab.points
+
+    def last_lines(self, memory: StickMemory) -> Iterator[str]:
+        if memory.energy is not None:
+            yield f"slip lost {quantity(memory.lost, 'J', 4)}, which is a part of the work"
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J]. This

@@ -15,6 +15,7 @@ from parcontact.effects.stick import effect
 from parcontact.effects.stick.solver import ShearOperator
 from parcontact.errors import ParcontactWarning
 from parcontact.job import Job
+from parcontact.printed import quantity
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5
 A = (3.0 * FORCE * RADIUS / (16.0 * G)) ** (1.0 / 3.0)  # Hertz, one body that is incompressible
@@ -388,6 +389,16 @@ def test_restart_is_exact(tmp_path: Path, name: str) -> None:
         assert getattr(last, name) == getattr(row, name)
     for name in ("traction_x", "traction_y"):
         assert np.array_equal(again.field(name), whole.field(name))
+
+
+@pytest.mark.parametrize("energy", [True, False])
+def test_the_end_of_a_run_names_the_loss_of_slip(energy: bool) -> None:
+    """Next to work and dissipated energy, which differ by it."""
+    stick = {"coefficient": 0.3, "stick": True}
+    march, rows = marched(Job.model_validate(rough(stick, points=16, output={"energy": energy})))
+    ((name, stick_slip),) = march.scene.effects.items()
+    said = f"slip lost {quantity(rows[-1].added[3], 'J', 4)}, which is a part of the work"
+    assert list(stick_slip.last_lines(march.state.memories[name])) == [said] * energy
 
 
 def test_without_stick_nothing_is_made() -> None:
