@@ -317,7 +317,8 @@ def _read(path: Path) -> tuple[Array, Array, int]:
     """Return wavenumbers [rad/m], the spectrum [m^3 or m^4], and the power of m in its unit."""
     table = read_named_columns(path, f"a table of {FORMS}", FORMS, {"q", *POWERS}, _are_enough)
     if not _are_enough(set(table.columns)):
-        raise InputError(f"{path}: {FORMS} were expected, got {', '.join(table.columns)}")
+        named = ", ".join(table.columns) or "none of them"
+        raise InputError(f"{path}: {FORMS} were expected, with q = 2 pi/wavelength; the first lines name {named}")
     if len(table.lines) < FEWEST_RINGS:
         raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {FEWEST_RINGS} were expected")
     (kind,) = POWERS.keys() & table.columns

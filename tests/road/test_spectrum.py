@@ -308,6 +308,8 @@ MISTAKES = [
     ("", "", "is empty"),
     ("q,C2D\n1,2\n", "", r":1: names and units of the columns were expected, such as q\[1/m\] C2D"),
     ("q[1/m] C2D[m^3]\n1 2\n2 1\n3 1\n", "", r"the unit of C2D must be one of m\^4"),
+    ("wavelength[um],C1D[m^3]\n3,3\n2,2\n1,1\n", "", "q = 2 pi/wavelength; the first lines name C1D"),
+    ("f[1/mm] PSD[mm^3]\n1 3\n2 2\n3 1\n", "", "q = 2 pi/wavelength; the first lines name none of them"),
     ("q[m] C2D[m^4]\n1 2\n2 1\n3 1\n", "", "the unit of q must be one of 1/m"),
     ("q[1/m] C2D[m^4]\n1 2\n2 1\n", "", "2 rows of numbers"),
     ("q[1/m] C2D[m^4]\n1 2\n3 1\n2 1\n", "", ":4: q must rise"),
