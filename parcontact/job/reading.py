@@ -504,12 +504,15 @@ SHOWN = (
     "initial",
     "history",
     "steady",
+    "numerics",
     "adhesion",
     "interface",
     "counterbody",
+    "body",
     "leakage",
     "bands",
 )  # sections that pictures and texts need; others may differ between versions
+SHOWN_NUMERICS = ("accuracy", "tolerance", "integrator")
 LAST = "checkpoint"  # last section of a job with every default
 FILES = ("file", "topography")  # shapes that come from files
 
@@ -523,6 +526,8 @@ def shown_job(path: Path) -> Job:
         if not text.endswith(b"\n") or not isinstance(data, dict) or LAST not in data:
             raise InputError(f"{path} is incomplete: it lacks the section {LAST}; restore the whole file")
         data = {name: data[name] for name in SHOWN if name in data}
+        numerics = data.get("numerics") or {}
+        data["numerics"] = {name: numerics[name] for name in SHOWN_NUMERICS if name in numerics}
         data["surface"] = [
             {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]
         ]

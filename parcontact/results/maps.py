@@ -106,7 +106,8 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
 
 
 def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> Panel:
-    """Return a panel of pressures on a line through the axis, with Hertz's pressure under the last load."""
+    """Return a panel of pressures on a line through the axis, with Hertz's pressure on a half space under the last
+    load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
     chosen, load = _choose_instants(run, fields)
@@ -119,7 +120,7 @@ def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> 
     force = float(field.mean() * run.area)
     reach = RANGE * max(float(np.abs(along[pressure > 0.0]).max(initial=0.0)) for _, along, pressure in curves)
     theory: list[Curve] = []
-    if isinstance(shape, Sphere) and force > 0.0:
+    if isinstance(shape, Sphere) and force > 0.0 and not run.job.asked("response"):
         r, poisson = np.linspace(-reach, reach, 401), run.job.material.poisson
         for name, modulus in _find_moduli(run):
             theory.append((name, r, hertz.pressure(np.abs(r), force, shape.radius, modulus, poisson)))

@@ -177,6 +177,18 @@ def test_a_resolved_job_reads_back_with_any_title(tmp_path: Path, title: str) ->
     assert shown_job(path).title == title
 
 
+@pytest.mark.parametrize("given", ["accuracy: 0.1", "tolerance: 1.0e-3, integrator: backward-euler"])
+def test_a_shown_job_has_what_its_errors_follow_from(tmp_path: Path, given: str) -> None:
+    """Texts state errors by the tolerance and cycles by the accuracy; a layer has no theory of a half space."""
+    job = job_of(tmp_path, f"{SMALL}numerics: {{{given}}}\nbody: {{thickness: 1.0e-3}}\n")
+    path = tmp_path / "job.resolved.yaml"
+    path.write_text(job.resolved().replace("numerics: {", "numerics: {slope: spectral, "))  # a key of version 0.1.0
+    shown = shown_job(path)
+    for name in ("accuracy", "tolerance", "integrator"):
+        assert getattr(shown.numerics, name) == getattr(job.numerics, name)
+    assert shown.section("body") == job.section("body")
+
+
 def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "job.resolved.yaml"
     path.write_text("[1, 2")

@@ -31,6 +31,9 @@ def test_sphere_is_drawn_with_hertz(tmp_path: Path, drawn: list[Figure]) -> None
     inside = exact > 0.5 * exact.max()
     assert inside.sum() > 8
     assert np.abs(p - exact)[inside].max() < 0.02 * exact.max()
+    (tmp_path / "layer").mkdir()
+    plots.plot([ran(tmp_path / "layer", KINDS["Hertz"][0] + "body: {thickness: 1.0e-3}\n")])
+    assert len(drawn[1].axes[0].get_lines()) == 1  # no theory of a half space
 
 
 def test_no_panel_of_friction_that_is_0(tmp_path: Path, drawn: list[Figure]) -> None:
