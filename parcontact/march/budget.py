@@ -192,7 +192,8 @@ def _lacking_waves(run: RunProperties) -> float:
 
 def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
     coherent = _grow_if_coherent(run, observed)
-    if fit is STILL and is_symmetric(run.centre, observed.position):
+    position = observed.position if run.cells_slid >= AVERAGED else (0.0, 0.0)  # short slides keep half of the symmetry
+    if fit is STILL and is_symmetric(run.centre, position):
         coherent = max(coherent, SYMMETRIC.value)
     error = fit.value * coherent * observed.correction * mean_over_spots(run, observed)
     return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error

@@ -103,7 +103,7 @@ EULER_AREA = Fit("area: the same of backward Euler", 0.18, 2.0, MARCHES, "1.1")
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
 SPOTS = Sphere | Cone | Pyramid | Punch  # shapes with one spot of contact, symmetric to its centre
-NEAR = 0.15  # accuracy: cells by which the centre of a symmetric shape may be off
+NEAR = 0.06  # accuracy: cells by which the centre of a symmetric shape may be off
 ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
 MANY_RADIUS = 0.7  # accuracy: least resolved radius or half width [cells] of many spots: more than single cells
 ONE_RADIUS = 1.3  # accuracy: the same of one spot, and of identical ones: more than five cells, or strips two wide
