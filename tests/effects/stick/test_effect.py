@@ -483,8 +483,8 @@ def test_creep_is_of_second_order() -> None:
 
 def test_errors_of_a_coarse_mesh_while_spots_stick() -> None:
     """Friction of a rough contact with a shear strength is too large while spots stick, as edge cells are part of them:
-    with 32 points along a side by more than the error of the area, and by less than the stated errors. The reference
-    has 128 points, which leave a quarter of the error."""
+    with 32 points along a side by more than 4 %, and by less than the stated errors. The reference has 128 points,
+    which leave a quarter of the error."""
     slide = {"pressure": 1e5, "velocity": 1.0, "distance": 6e-7, "cells_per_step": 1.0}
     rows = []
     for points in (32, 128):
@@ -496,7 +496,7 @@ def test_errors_of_a_coarse_mesh_while_spots_stick() -> None:
         assert abs(ratio - 1.0) <= coarse.error_friction
     first, exact = rows[0][0], rows[1][0]
     assert first.added[2] > 0.8 * first.measures.contact_area
-    assert first.measures.friction_interface > (1.0 + first.error_area) * exact.measures.friction_interface
+    assert first.measures.friction_interface > 1.04 * exact.measures.friction_interface
 
 
 def test_a_sphere_sheared_in_many_steps() -> None:
