@@ -327,7 +327,7 @@ class RoadHistory(RoadSliding):
         """Yield the row of measures.csv and the rows of bands.csv for each instant. `march` must have been called."""
         way, virgin = 1.0, self.job.initial.state == "virgin"
         if virgin:
-            yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan)), []
+            yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan), added=(0.0, 0.0)), []
         for step, instant in enumerate(self.instants(), int(virgin)):
             way = math.copysign(1.0, instant.velocity) if instant.velocity else way
             point = self._point_at(instant, way)

@@ -231,16 +231,20 @@ def test_ranks_agree() -> None:
 
 @pytest.mark.usefixtures("few_rungs")
 def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history; another
-    velocity does not replace the results; `info` counts the marches of a run that was stopped."""
+    """Frictions of bands, with that of an interface, add up to that of measures.csv; a second run does nothing;
+    `--until` ends the history; another velocity does not replace the results; `info` counts the marches of a run that
+    was stopped."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(stopping, "age", lambda: 0.0)  # of this process, from which --wall counts
-    Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
+    rubbed = {**JOB, "interface": {"shear_stress": 1e5}, "history": [{"pressure": 1e5}, SLIDE]}
+    Path("job.yaml").write_text(dump(rubbed))
     assert main(["job.yaml", "--quiet", "--wall", "01:00:00"]) == 0  # loops may be compiled meanwhile
     table, bands = (tables.read_columns(Path("out/job") / name) for name in ("measures.csv", "bands.csv"))
     friction = np.reshape(bands["friction"], (-1, 2)).sum(axis=1)
     assert np.abs(friction) == pytest.approx(np.array(table["friction"])[1:], abs=1e-12)
     assert np.reshape(bands["time"], (-1, 2))[:, 0] == pytest.approx(np.array(table["time"])[1:])
+    parts = np.add(table["friction_viscous"], table["friction_interface"])
+    assert parts == pytest.approx(np.array(table["friction"]), abs=1e-12)
     log = Path("out/job/run.log").read_text()
     ends = ("mu_max, the highest", "mu_dyn, the mean", "error of friction", "error of contact area", "done: results")
     assert [log.count(text) for text in ends] == [1] * 5
