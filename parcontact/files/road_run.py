@@ -20,7 +20,7 @@ from ..columns import BANDS_OVER_TIME, added_by, names_of, to_csv
 from ..errors import DONE, STOPPED_EARLY, InputError
 from ..job import Job, listing
 from ..job.history import reached
-from ..march.budget import SHOWN, exceeds
+from ..march.budget import SHOWN, exceeds, find_remedy
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..printed import Bar
@@ -202,7 +202,7 @@ def sum_up_errors(rows: Sequence[StepRow], asked: tuple[float, float]) -> Iterab
     """Yield a sentence on the errors of friction, and a sentence on the errors of area, in the rows of sliding.
 
     Each sentence states the mean error, which should not exceed the accuracy `asked` of friction or of area, and the
-    largest error with its sources.
+    largest error with its sources and, where the mean is too large, a remedy.
     """
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
@@ -215,10 +215,11 @@ def sum_up_errors(rows: Sequence[StepRow], asked: tuple[float, float]) -> Iterab
         row, worst = max(known, key=lambda one: one[1].total)
         parts = ", ".join(f"{SHOWN[part]} {100 * value:.2g} %" for part, value in worst._asdict().items() if value)
         mean = sum(one.total for _, one in known) / len(known)
-        more = (
-            f", more than the {100 * accuracy:g} % that numerics.accuracy asks for" if exceeds(mean, accuracy) else ""
-        )
+        more, remedy = "", ""
+        if exceeds(mean, accuracy):
+            more = f", more than the {100 * accuracy:g} % that numerics.accuracy asks for"
+            remedy = f"; try {find_remedy(worst, ('time',))}"
         yield (
             f"error of {name}: {100 * mean:.2g} % on average{more}, at most {100 * worst.total:.2g} % "
-            f"(t = {row.time:.4g} s, slip {row.distance:.3g} m: {parts})"
+            f"(t = {row.time:.4g} s, slip {row.distance:.3g} m: {parts}){remedy}"
         )

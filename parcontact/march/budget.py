@@ -451,10 +451,15 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
     the sources of error whose settings the program has chosen from `numerics.accuracy`."""
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
+    return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {find_remedy(parts, chosen)}"
+
+
+def find_remedy(parts: ErrorParts, chosen: Collection[str] = ()) -> str:
+    """Return what reduces the largest part of an error. `chosen` names the sources of error whose settings the program
+    has chosen from `numerics.accuracy`."""
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
     in_bands = parts.method > 0.0 or parts.scatter > 0.0
-    remedy = SMALLER if worst in chosen else MESH_OF_BANDS if in_bands and worst == "mesh" else REMEDIES[worst]
-    return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {remedy}"
+    return SMALLER if worst in chosen else MESH_OF_BANDS if in_bands and worst == "mesh" else REMEDIES[worst]
 
 
 def exceeds(error: float, accuracy: float) -> bool:

@@ -186,6 +186,8 @@ def test_an_elastic_body_has_no_friction_through_rests_and_slides() -> None:
     assert column(rows, "friction").max() < 0.01
     for some in (rows[:51], rows):
         assert [text.split(":")[0] for text in sum_up_errors(some, (0.1, 0.1))] == ["error of contact area"]
+    for accuracy, advised in ((1e-6, True), (10.0, False)):
+        assert ["; try " in text for text in sum_up_errors(rows, (accuracy, accuracy))] == [advised]
 
 
 class StoppedError(Exception):
