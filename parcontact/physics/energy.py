@@ -453,9 +453,13 @@ class Probe:
     def _measure_edges(self, sums: Sequence[float], mean: float) -> float:
         """Return the error of the mean gap by the edges of a free box, from `_sum_edges` of all ranks."""
         nx, ny = self.slab.nx, self.slab.ny
-        along = ((sums[:2], ny, nx), (sums[2:], nx, ny))
-        free = [one for one, cyclic in zip(along, self.surface.periodic, strict=True) if not cyclic]
-        return sum(_error_by_edges(*(edge / across for edge in edges), mean, n) for edges, across, n in free if n > 1)
+        (first_x, last_x, first_y, last_y), (along_x, along_y) = sums, self.surface.periodic
+        error = 0.0
+        if nx > 1 and not along_x:
+            error += _error_by_edges(first_x / ny, last_x / ny, mean, nx)
+        if ny > 1 and not along_y:
+            error += _error_by_edges(first_y / nx, last_y / nx, mean, ny)
+        return error
 
     def _straightness(self, sides_x: float, sides_y: float) -> float:
         """Return how nearly all edges of contact follow one axis of the grid; the numbers of their cell sides are those

@@ -104,8 +104,8 @@ def _spectra(sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], of: A
         drawn = power > ROUNDING * power.max(initial=0.0)
         lines.append(Line(label, q[drawn], power[drawn], style.line(number)))
         seen += power[drawn].tolist()
-    cells = [length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True) if n > 1]
-    cell = max(cells, default=max(sketch.size))
+    steps = [length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True) if n > 1]
+    cell = max(steps, default=max(sketch.size))
     ends = np.array([min(seen, default=1.0), max(seen, default=1.0)])
     for cells, dashes in ((RESOLVED, ":"), (2, "--")):
         at = np.full(2, 2 * np.pi / (cells * cell))

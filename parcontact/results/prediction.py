@@ -323,7 +323,8 @@ def _rings_on_grid(
 ) -> Rings:
     """Return the waves of a spectrum [m^4] between the wavenumbers `ends` [rad/m] on the grid of a job. On one row or
     column of points all waves lie along it, and the spectrum [m^3] is that of the profile."""
-    rings = persson.rings_of_spectrum(density, *ends, slide, kinks, line=job.grid.is_line)
+    spectrum = lambda k: np.asarray(density(k), float)  # noqa: E731
+    rings = persson.rings_of_spectrum(spectrum, *ends, slide, kinks, line=job.grid.is_line)
     if job.grid.points[0] > 1:
         return rings
     amplitude, kx, ky = rings.waves

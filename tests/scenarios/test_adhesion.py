@@ -52,7 +52,7 @@ def test_pull_off_of_a_sphere(tabor: float, points: int, box: float, exact: floa
     ("tabor", "points", "box", "most"),
     [(3, 28, 2.6, 5), (3, 40, 2.6, 5), (3, 64, 2.6, 8), (1, 14, 4, 5), (1, 24, 6, 5)],
 )
-def test_the_error_of_a_pull_off_contains_the_range(tabor: float, points: int, box: float, most: float) -> None:
+def test_the_error_of_a_pull_off_contains_the_range(tabor: int, points: int, box: float, most: float) -> None:
     """Cells of 2, 1.4, 0.9, 0.7 and 0.6 process zones hold the edge of contact, which the area does not show: pull-offs
     are up to 30 % too large, as the grid is symmetric to the sphere. The stated error covers it, and is at most some
     times as large."""
