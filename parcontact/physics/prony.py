@@ -256,7 +256,7 @@ def _zero_above(index: int, series: Prony) -> Zero:
     times = series.relaxation_times
     own, rest = _split(pole, sign * room, series)
     # f rises between poles: within this distance the term of the pole is larger than the rest
-    least = room * min(1.0, abs(own / rest))
+    least = room * abs(own / rest)
     bracket = np.log(least / 2), np.log(1.5 * room)
     offset = sign * np.exp(brentq(lambda x: sum(_split(pole, sign * np.exp(x), series)), *bracket, xtol=1e-15))
     distances = times - times[pole] - offset
