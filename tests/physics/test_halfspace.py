@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution, MirroredConvolution
-from parcontact.physics.halfspace import UNIFORM, HalfSpace, love
+from parcontact.physics.halfspace import UNIFORM, HalfSpace, Response, love
 
 from .maps import coordinates, gathered, product, random_map
 
@@ -164,3 +164,13 @@ def test_single_precision(comm: MPI.Intracomm) -> None:
     assert_allclose(single.apply(mine, slab.empty()), reference[slab.rows], atol=tolerance)
     reference = applied(free(slab, size), whole)
     assert_allclose(applied(free(slab, size, dtype=np.float32), whole), reference, atol=1e-6 * np.abs(reference).max())
+
+
+def test_compliance_of_another_body() -> None:
+    """(1 - nu)/q times its ratio to a half space, here 3 q; 0 for q = 0."""
+
+    class Foundation(Response):
+        def compliance_ratio(self, q: Array) -> Array:
+            return 3.0 * q
+
+    assert_allclose(Foundation(poisson=0.25).compliance(np.array([0.0, 0.5, 8.0])), [0.0, 2.25, 2.25], rtol=1e-15)
