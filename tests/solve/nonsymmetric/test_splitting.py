@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from parcontact.contact.certificate import Judge
-from parcontact.contact.problem import Approach, Box, InterfaceLaw, MeanPressure
+from parcontact.contact.problem import STEPS, Approach, Box, InterfaceLaw, MeanPressure
 from parcontact.contact.projected import Projected
 from parcontact.contact.splitting import LEVEL_EXCESS, RELAXATION, Acceleration, Splitting, _Given
 from parcontact.effects.layer.effect import Layer
@@ -253,3 +254,13 @@ def test_closings_that_fall_are_refused() -> None:
         InterfaceLaw.of_table(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
     with pytest.raises(InputError, match="which rise"):
         InterfaceLaw.of_table(np.array([2.0, 1.0]), np.array([1.0, 1.5]))
+
+
+def test_law_that_is_linear_in_the_logarithm() -> None:
+    """It has the points of its table, STEPS equal pieces of log p between two of them, and the slope of the first one
+    below: c = 0.2 (1 + log(p/p_1)), and c(0) = 0."""
+    points = np.array([0.1, 1.0, 10.0, 30.0])
+    law = InterfaceLaw.of_table(points, 0.7 + 0.2 * np.log(points))
+    assert_allclose(law.pressures[1::STEPS], points, rtol=1e-14)
+    assert_allclose(np.diff(np.log(law.pressures[1:])), np.repeat(np.diff(np.log(points)) / STEPS, STEPS), rtol=1e-12)
+    assert_allclose(law.closings, [0.0, *(0.2 * (1.0 + np.log(law.pressures[1:] / 0.1)))], rtol=1e-13)
