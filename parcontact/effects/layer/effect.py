@@ -391,7 +391,8 @@ def _no_counterbody(body: Any, counterbody: Any) -> Iterator[Fault]:
 def _no_stick(body: Any, interface: Any) -> Iterator[Fault]:
     if interface.stick:
         sentence = "needs a half space: pressure on a layer moves its surface sideways, which is not solved for"
-        yield Fault(f"{sentence}; leave out stick, or body {SMALL_CONTACT}", ("interface", "stick"))
+        remedy = f"use a shear_stress without stick, or leave out body {SMALL_CONTACT}"
+        yield Fault(f"{sentence}; {remedy}", ("interface", "stick"))
 
 
 def _no_softening(body: Any, softening: Any) -> Iterator[Fault]:
