@@ -121,8 +121,9 @@ EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decide
 
 
 class RungTask(NamedTuple):
-    """One march to make. `band`, `sample` and `rung` are numbers from 0. A `hard` march has no closing of finer
-    bands."""
+    """One march (a simulation over time) to make: of one `band`, in one `sample` of the surface, under the load with
+    the number `rung`. Numbers begin with 0. A `hard` march leaves out that roughness of finer bands is squeezed under
+    pressure."""
 
     band: int
     sample: int

@@ -56,7 +56,8 @@ class Constraint(Protocol):
         the parameter of `splitting` [pressure/length]."""
 
     def add_closing(self, u: Array, p: Array) -> Array:
-        """Return `u + c(p)`. Without a closing, return the map u itself."""
+        """Return `u + c(p)`, with the approach c(p) of the mean planes by roughness finer than the grid. Without such
+        roughness, return the map u itself."""
 
     def in_units(self, pressure: float, length: float) -> "Constraint":
         """Return the constraint in the given units of pressure and length."""
@@ -87,7 +88,7 @@ class Box:
         return float(_resolve_bounds(s, h, gamma, self.lowest, self.highest, p, reflected))
 
     def add_closing(self, u: Array, p: Array) -> Array:
-        """Return u: bounds have no closing."""
+        """Return u: bounds of the pressure do not let the mean planes approach."""
         return u
 
     def in_units(self, pressure: float, length: float) -> "Box":

@@ -44,7 +44,7 @@ from .solver import ContactSolver
 
 @dataclass(frozen=True)
 class Level:
-    """One grid of a sequence: its slab and the heights on it."""
+    """One grid of a sequence from fine to coarse: the part of the grid on this rank (`slab`), and the heights there."""
 
     slab: Slab
     heights: Array
@@ -125,8 +125,9 @@ def choose_tiles(
     """Return the tiles of a grid that may touch; None if no tile may touch, or if the tiles hold more than
     LARGEST_SHARE of the points. Collective.
 
-    `slab` and `heights` belong to this grid, and `below` is the contact on the next coarser grid. `blocks` is the slab
-    of the grid of blocks, with the `operators` of the body on that grid. `box` bounds the pressure.
+    `slab` is the part of the grid on this rank, with its `heights`, and `below` is the contact on the next coarser
+    grid. `blocks` is the part on this rank of a still coarser grid, whose points are the blocks that may touch or not.
+    The `operators` of the body belong to that grid. `box` bounds the pressure.
     """
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)

@@ -366,7 +366,7 @@ def estimate_errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[st
 
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Return the errors that are proven: an error below the uncertainty of its reference counts as this uncertainty."""
+    """Return each error, or the uncertainty of its reference if this is larger: smaller errors cannot be seen."""
     return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 

@@ -223,7 +223,8 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
-    """Write the maps of an instant or of a point, and then the coordinates `marks` of this place. Collective."""
+    """Write the maps of one instant of a run, or of one point of a curve, and then its coordinates `marks`, such as the
+    time or the velocity. Collective."""
     write_rows(
         path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
     )

@@ -181,8 +181,8 @@ def warnings_of(log: Path) -> list[str]:
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return the last message of a log on chosen meshes (`march.mesh`) as a list of lines, which is empty if there is
-    none."""
+    """Return a list with the line in which a log last states the chosen mesh (`march.mesh`). The list is empty if the
+    log has no such line."""
     return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 

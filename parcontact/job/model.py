@@ -1,4 +1,4 @@
-"""The job as an object: its sections, in SI units, which do not change. This module needs no MPI and reads no maps.
+"""The job as an object that does not change. Its sections are in SI units. This module needs no MPI and reads no maps.
 
 The JSON Schema (draft 2020-12) of job files, for editors, and a table of all keys follow from the types of the
 sections. The schema has the words, ranges, exclusions and defaults of each key. Rules between sections (resolution,

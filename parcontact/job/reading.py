@@ -172,10 +172,10 @@ Change = str | tuple[str, Any]  # `key.path=value`, or a key and Python data
 def read_job(
     path: Path, changes: Iterable[Change], case: int = 0, given: Source | None = None
 ) -> tuple[Source, tuple[Included, ...], Sweep | None]:
-    """Return the data of one case of a job with its overrides and included materials, the files of these materials, and
-    the sweep of the job. The sweep is None if it has mistakes.
+    """Return three things: the data of one case of a job, with overrides and included materials; the files of these
+    materials; and the sweep of the job, or None if the sweep has mistakes.
 
-    If a job is `given` as a source, no file is read.
+    The file at `path` is not read if `given` is its content.
     """
     source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]

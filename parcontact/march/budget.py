@@ -463,8 +463,8 @@ def find_remedy(parts: ErrorParts, chosen: Collection[str] = ()) -> str:
 
 
 def exceeds(error: float, accuracy: float) -> bool:
-    """Return True if an estimated error exceeds the requested accuracy by so much that the printed numbers differ,
-    too."""
+    """Return True if an estimated error is more than ROUNDED times the requested accuracy, so that printed numbers
+    differ."""
     return error > ROUNDED * accuracy
 
 

@@ -3,11 +3,12 @@
 **Tolerance.** `numerics.tolerance` is small enough for the scenes in which friction depends most on the solver. If
 `numerics.accuracy` has chosen this tolerance, solves may use a larger one, by a factor that follows from the last
 steps. The estimated error of the solver must stay below OF_SOLVER times the accuracy of friction, and below
-OF_SOLVER_IN_AREA times the accuracy of the area. If the other parts of the error budget exceed the accuracy, the same
-shares of these parts are the limits. Errors are proportional to the certificate of a solve. Each step thus gives a
-factor by which its tolerance might have been larger, and the factor of the next solve is the mean over the last steps.
-This mean is rounded to a power of the square root of two, so that rounding errors do not change the tolerance. It
-belongs to the state of a run, so that a restarted run continues identically.
+OF_SOLVER_IN_AREA times the accuracy of the area. If the other parts of the error budget exceed the accuracy, the limits
+are OF_SOLVER and OF_SOLVER_IN_AREA times these parts. The error is proportional to the residual of a solve
+(`contact.certificate`). Each step thus gives a factor by which its tolerance might have been larger, and the factor of
+the next solve is the mean over the last steps. This mean is rounded to a power of the square root of two, so that
+rounding errors do not change the tolerance. It belongs to the state of a run, so that a restarted run continues
+identically.
 
 The last solve before a change of velocity or load, and a steady start, have a small tolerance: the body remembers the
 error of the displacement, and a much larger modulus may multiply this error after the change. The first and the last

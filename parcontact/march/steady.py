@@ -279,7 +279,8 @@ class SteadySliding:
     table: tuple[str, Sequence[str]] | None = None
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
-        """Return warnings about the job and its heights, also at the given temperatures [deg C]; collective."""
+        """Return warnings about the job and its heights, and about frequencies at which the material was not measured
+        at the `temperatures` [deg C] of a friction curve; collective."""
         return sanity.find_doubts(self.setup, temperatures)
 
     def notes(self) -> list[str]:

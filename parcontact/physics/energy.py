@@ -139,9 +139,9 @@ def dissipation_weights(z: Array) -> StepProducts:
 
 
 def bend_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the difference between the exact work of a branch in a step and its work
-    by the trapezoidal rule. The exact work is the integral of `<h, A^-1 u'>`; the trapezoidal rule is the mean of
-    `<h, A^-1 du>` at both ends. `z = dt/tau` has any shape."""
+    """Return the weights with which `StepProducts` give the error of the trapezoidal rule in the work of a branch. This
+    error is the exact work in a step, the integral of `<h, A^-1 u'>`, minus the mean of `<h, A^-1 du>` at both ends of
+    the step. `z = dt/tau` has any shape."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     q = bend(z)

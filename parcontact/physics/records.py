@@ -23,11 +23,12 @@ SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per si
 
 
 def excess_of(dx: float, dy: float, edges_follow_grid: bool = False) -> float:
-    """Return by how many cells the counted contact area is too large, per cell side on the edge of contact.
+    """Return by how many cells the counted contact area is too large, divided by the number of cell sides on the edge
+    of contact.
 
-    The excess is SIDE on square cells, and on all cells if `edges_follow_grid`. On long cells the excess is smaller, as
-    edges of contact run rather along the longer sides: SIDE times (shorter/longer of dx and dy) to the power
-    LONG_CELLS.
+    This excess is the constant SIDE for square cells, and for all cells if `edges_follow_grid`. For long cells it is
+    smaller, since edges of contact then follow mostly the longer sides: SIDE times r to the power LONG_CELLS, with r
+    the shorter of `dx` and `dy` over the longer one.
     """
     return SIDE if edges_follow_grid else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 

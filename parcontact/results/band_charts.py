@@ -1,8 +1,8 @@
 """Panels of friction curves, of bands, and of sweeps.
 
 A curve (steady.csv) is drawn against the velocity v, or against the pressure if only the pressure varies. Each
-temperature has its own line. With the shift factor a_T as the reduced velocity a_T v, these lines form one master
-curve, which has a panel of its own.
+temperature has its own line. A further panel draws all of them against the reduced velocity a_T v, with the shift
+factor a_T, as one master curve.
 
 Four kinds of panels show bands: friction against velocity; friction against the slip since the start of each slide of a
 history; contact area against magnification; and quantities of effects against the shortest wave of a band. If the table

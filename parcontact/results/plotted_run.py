@@ -235,8 +235,8 @@ class Abscissa:
     loop: bool = False
 
     def series(self, lines: dict[str, Array]) -> list[Line]:
-        """Return the lines of columns of the run, given by the names of the lines. A line called '' has no entry in the
-        legend."""
+        """Return one curve for each column of the run in `lines`, whose keys are the names for the legend. A curve
+        named '' has no entry there."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows

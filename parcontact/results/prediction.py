@@ -307,7 +307,8 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
     """Return the waves of a measured spectrum in rings of equal wavenumber (`persson.Rings`), without waves longer than
-    the box or shorter than two cells. `slide` is the largest distance [m] between two positions of the surface."""
+    the box or shorter than two cells. Waves are so dense that neighbours stay in phase while the surface slides by
+    `slide` [m]."""
     from ..job import measured_maps
 
     found, (long, short) = measured_maps.read_spectrum(part, job.grid.is_line)

@@ -182,7 +182,7 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
 
 
 def largest(values: Iterable[float]) -> float:
-    """Return the largest value that is not NaN, or NaN."""
+    """Return the largest value that is not NaN; NaN if there is none."""
     return max((value for value in values if value == value), default=math.nan)
 
 
@@ -542,8 +542,8 @@ def friction_along(stage: Stage, columns: Mapping[str, Array]) -> Array:
 
 
 def way_along(stage: Stage, columns: Mapping[str, Array], start: float) -> Array | None:
-    """Return the positions [m] of the surface along the velocity of a stage, in each row, relative to its position at
-    the start of the stage at the time `start` [s]. Return None for a constant velocity, whose stage has no cycles."""
+    """Return the distance [m] that the surface has moved along the velocity in each row of a stage. The stage starts at
+    the time `start` [s]. Return None for a constant velocity, whose stage has no cycles."""
     if not isinstance(stage.velocity, Swing):
         return None
     return stage.speed * np.array([stage.moving(time - start) for time in columns["time"].tolist()])

@@ -65,7 +65,7 @@ class PronySeries:
     temperature.
 
     `error` is the rms relative misfit of the fitted data, and `best` is the smallest misfit of any series. `alone` has
-    two further smallest misfits: of fits to the storage modulus alone, and to the loss modulus alone. `scatter` is the
+    the smallest misfit if only the storage modulus is fitted, and if only the loss modulus is fitted. `scatter` is the
     relative scatter of the data of a sweep about a smooth curve, NaN if sweeps are too short. `band` [rad/s] is the
     range of frequencies in which moduli are known. `loss_errors` are the relative errors (two standard deviations) of
     the loss modulus inside this range, at its lower end and at its upper end.

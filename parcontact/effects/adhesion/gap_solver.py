@@ -310,9 +310,9 @@ LEAST_TRACTION = 1e-3  # load below which errors are not scaled by it, over the 
 class GapOperators(NamedTuple):
     """The operator A of a body, and its `inverse` K on fields of mean 0. K of a uniform field is 0.
 
-    `mean` is the displacement under a uniform pressure of 1. It is 0 if a uniform pressure does not move the surface.
-    Then `least_mean` is a positive number that replaces `mean` as a divisor; otherwise both are equal. Both are
-    infinite if K is the inverse of A on all fields.
+    `mean` is the displacement under a uniform pressure of 1, of which K takes no account; 0 if a uniform pressure does
+    not move the surface. Divisions are by `least_mean`, which is a positive number if `mean` is 0, and otherwise equal
+    to it. If K is the inverse of A on all fields, both are infinite, so that `1/mean` adds nothing.
     """
 
     operator: Operator

@@ -177,8 +177,8 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def changed_material(job: Any) -> Any:
-        """Return the pair of both bodies, which replaces the material. For steady sliding the counterbody has its
-        long-term modulus: it carries the roughness, so that its load does not change with time."""
+        """Return a material (`Pair`) that replaces body and counterbody by one body. For steady sliding the counterbody
+        has its long-term modulus: it carries the roughness, so that its load does not change with time."""
         relaxed = _has_relaxed(job)
         if isinstance(job.material, Pair) or (relaxed and job.counterbody.fitted.long_modulus == 0.0):  # refused
             return job.material

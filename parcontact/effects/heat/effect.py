@@ -219,8 +219,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return ThermalMemory(heat, self._slab.zeros())
 
     def follow(self, instant: Instant, memory: ThermalMemory) -> Changes[ThermalMemory]:
-        """Return the changes of a step, with the temperatures after it. The waves of heat and the map of temperatures
-        are changed in place."""
+        """Return the memory of heat and temperatures after a step, with what else the step changes. The waves of heat
+        and the map of temperatures are changed in place."""
         step, pressure = instant.step, instant.pressure
         if self._pulled:
             pressure = np.maximum(pressure, 0.0)

@@ -120,11 +120,10 @@ class Depths:
         return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
 
     def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
-        """Return the temperature rise for a unit of heat, multiplied by the conductivity [m], in the shape of `beta`.
-        The sum over waves is accurate to 1e-5. `beta` [1/m] is defined by (1). Heat has diffused for a time t, given as
+        """Return the product [m] of conductivity and temperature rise for a unit of heat, in the shape of `beta`. The
+        sum over waves is accurate to 1e-5. `beta` [1/m] is defined by (1). Heat has diffused for a time t, given as
         `reach = D t` [m^2]. If `felt` is True, return the rise at the depths where heat is released, else the rise of
-        the surface.
-        """
+        the surface."""
         total = np.zeros_like(beta)
         for m, weight in zip(*self._waves(felt), strict=True):
             square = beta**2 + m**2

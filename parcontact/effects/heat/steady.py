@@ -109,12 +109,13 @@ class Feedback:
     def solve_fixed_point(
         self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float, most: float = math.inf
     ) -> Point:
-        """Return the point `warmed(rise)` whose own flash temperature is `rise` [K].
+        """Return the steady state `warmed(rise)` that causes the flash temperature `rise` [K] for which it was
+        calculated.
 
-        Both agree within the relative `tolerance`, which is limited to the range from FINEST to COARSEST. `speed` is in
-        m/s, and `place` holds the mean pressure [Pa] and the temperature of the cold body [deg C]. The material's shift
-        ends at the rise `most` [K], above which no rise is tried. Raises RunError if the flash temperature is above
-        `most`, or does not settle in MOST_ROUNDS rounds.
+        Rise and flash temperature agree within the relative `tolerance`, which is limited to the range from FINEST to
+        COARSEST. `speed` is in m/s, and `place` holds the mean pressure [Pa] and the temperature of the cold body [deg
+        C]. The material's shift ends at the rise `most` [K], above which no rise is tried. Raises RunError if the flash
+        temperature is above `most`, or does not settle in MOST_ROUNDS rounds.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -264,8 +265,8 @@ SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits 
 
 
 def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
-    """Return wavenumbers m [1/m] along the depth for bands between the wavenumbers `low` and `high` [1/m], and the
-    weights of these m in `2/pi int ... dm`; both have the shape (m,)."""
+    """Return the wavenumbers m [1/m] at which integrals `2/pi int ... dm` over the depth are evaluated, and their
+    weights [1/m]; both have the shape (m,). The bands lie between the wavenumbers `low` and `high` [1/m]."""
     ends = np.log(LOWEST * low), np.log(HIGHEST * high)
     m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
     step = float(np.log(m[1] / m[0]))

@@ -133,14 +133,14 @@ class Leakage(Part):
         return FLUIDS[name] if isinstance(name, str) else Fluid("the fluid", name)
 
     def drop(self, pressures: Pair) -> PressureDrop:
-        """Return the pressure drop of the fluid from a high to a low pressure [Pa]."""
+        """Return the fluid with the two `pressures` [Pa] between which it flows, the high one first."""
         assert self.pressures is not None
         ambient = self.pressures[1] if self.ambient is None else self.ambient
         return PressureDrop(self.substance, *pressures, True, ambient)
 
     def drop_at(self, history: Any, stage: int, time: float) -> PressureDrop:
-        """Return the pressure drop of the fluid at a `time` [s] of the `history`. `stage` is the number of the stage at
-        this time."""
+        """Return the fluid with the two pressures between which it flows at a `time` [s] of the `history`. `stage` is
+        the number of the stage at this time."""
         lasts, given = history[stage].seconds, history[stage].fluid_pressures
         if given is None:
             return self.drop(self.before(history, stage))

@@ -536,16 +536,16 @@ class PressureDrop:
         return np.cbrt(gap**2 * (pressure / self.pressures[0] * gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
-        """Return the volume flow [m^3/s] at the low pressure, through a conductivity [m^3] over a `length` along and a
-        `width` across the flow [m]; NaN for a gas that flows into a vacuum."""
+        """Return the volume flow [m^3/s], measured at the low pressure. The seal has a conductivity [m^3] and is
+        `length` [m] long along the flow and `width` [m] wide. NaN for a gas that flows into a vacuum."""
         drive = self.high - self.low
         if self.fluid.molar_mass is not None:
             drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
     def mass_flow(self, conductivity: float, length: float, width: float) -> float:
-        """Return the mass flow [kg/s] through a conductivity [m^3] over a `length` along and a `width` across the flow
-        [m]; NaN if the density is unknown."""
+        """Return the mass flow [kg/s]. The seal has a conductivity [m^3] and is `length` [m] long along the flow and
+        `width` [m] wide. NaN if the density is unknown."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
 

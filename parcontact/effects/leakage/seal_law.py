@@ -207,11 +207,12 @@ class Rounds:
 def seal_flow(
     gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
 ) -> dict[str, float]:
-    """Return the values of a seal's columns by name, and as `bound` the largest mass flow [kg/s] that inertia lets
-    pass, after the last round.
+    """Return the values of a seal's columns by name, and as `bound` the largest mass flow [kg/s] that the inertia of a
+    gas lets pass.
 
-    `gap` [m] and `share` are the maps of the gap and of s, and `size` is (lx, ly) [m]. `rounds` is None if the pressure
-    of the fluid is ambient everywhere. The gap counts as closed if less flows through it than through the small leak.
+    `gap` [m] and `share` are the maps of the gap and of s, and `size` is (lx, ly) [m]. `rounds` are the finished
+    iterations of the fluid pressure; None if this pressure is ambient everywhere. The gap counts as closed if less
+    flows through it than through the small leak.
     """
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)

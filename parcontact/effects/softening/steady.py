@@ -247,8 +247,9 @@ class StrainLoop:
         self.softened = Softened(section.made, max(setup.size), (section.made.start,) * count_octaves(setup))
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
-        """Return the steady state whose moduli belong to its own strains; collective. `solve` returns a state for the
-        present `setup` of `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
+        """Return the steady state of sliding whose moduli belong to its own strains; collective. Each call of the
+        argument `solve` calculates a steady state with the moduli in `sliding.setup` (`march.steady.SteadySliding`).
+        Raises RunError."""
         points, rounds = list[Point](), list[Round]()
 
         def once(softened: Softened) -> Round:
