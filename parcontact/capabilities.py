@@ -56,8 +56,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class ColumnPanel:
-    """A panel of columns of a table whose rows and horizontal axis are not chosen yet. `columns` has the name of each
-    column by the name of its line."""
+    """A panel of columns of a table whose rows and horizontal axis are not chosen yet. `columns` maps the name of each
+    curve to the name of its column."""
 
     key: str
     y: Axis

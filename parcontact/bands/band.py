@@ -57,7 +57,7 @@ BELOW = 4.5  # accuracy: first rung below the mean, over the rms pressure, near 
 
 @dataclass(frozen=True)
 class PressureLadder:
-    """The pressures at which a band is solved, its `rungs`: rising [Pa], shape (n,)."""
+    """The mean pressures at which a band is solved, its `rungs`: rising [Pa], shape (n,)."""
 
     rungs: Array
 
@@ -74,8 +74,8 @@ class PressureLadder:
         return cls(np.geomspace(bottom, top, count))
 
     def weights_of_rungs(self, pressures: Array) -> tuple[Array, float]:
-        """Return the weights W_j of the rungs for a map of pressures [Pa], and the share of the load above all
-        rungs."""
+        """Return the weights W_j of the module, with which results at the rungs are added for a map of pressures [Pa].
+        Also return the share of the load that is above all rungs."""
         p, rungs = pressures[pressures > 0.0], self.rungs
         count = len(rungs)
         if count == 1 or not p.size:
@@ -104,9 +104,9 @@ class Rung:
 
     `friction` [-] of the band's waves follows from the dissipated power, and `friction_slopes` from the pressures on
     slopes. Contact areas are shares of the nominal area. `Cascade.climb` adds the approach of finer bands to the
-    `approach` [m]. `weights` are the weights of the rungs of the next finer band, and `load_lost` is the share of the
-    load above the highest of these rungs. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
-    by name (`Probe`).
+    `approach` [m]. The pressures of this contact load the next finer band: `weights` are the weights of its rungs, and
+    `load_lost` is the share of the load above the highest of these rungs. `powers` [W/m^2] are lost in each branch.
+    `found` has the arrays of effects by name (`Probe`).
     """
 
     pressure: float
@@ -342,7 +342,7 @@ def _timed(stage: Stage, seconds: float, first: float, growth: float) -> Stage:
 
 
 class BandClock:
-    """Finds the place of a band's steps in the job's history; `parts` is the result of `parts_of_history`."""
+    """Finds when a step of a band happens in the history of the job; `parts` is the result of `parts_of_history`."""
 
     def __init__(self, job: Job, parts: list[tuple[Stage, int]]) -> None:
         timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)

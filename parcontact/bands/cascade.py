@@ -119,7 +119,8 @@ NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved
 
 
 class Task(NamedTuple):
-    """One contact to solve. `band`, `sample` and `rung` are numbers from 0, and `law` is the closing of finer bands."""
+    """One contact to solve: of one `band`, in one `sample` of the surface, under the mean pressure with the number
+    `rung`. Numbers begin with 0. `law` is the approach of the mean planes as pressure squeezes finer bands."""
 
     band: int
     sample: int
@@ -152,8 +153,9 @@ class BandResult:
 
 
 class Shares(NamedTuple):
-    """Shares of the rungs of a ladder in a distribution of pressure. Rung j has the pressure p_j [Pa], the load W_j p_j
-    [Pa] per nominal area, and a power in arbitrary units. `mean` is the mean pressure of the road [Pa]."""
+    """Shares of the mean pressures at which a band is solved (rungs), in a distribution of pressure. Rung j has the
+    pressure p_j [Pa], the load W_j p_j [Pa] per nominal area, and a power in arbitrary units. `mean` is the mean
+    pressure of the road [Pa]."""
 
     pressures: Array
     loads: Array
@@ -219,7 +221,7 @@ class Cascade:
         self._temperatures = list(temperatures)
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each wave of a band to `at(values[band])`."""
+        """Set the factors by which the moduli are multiplied for each wave of a band: `at(values[band])`."""
         self._factors = at, list(values)
         for (number, _), band in self._bands.items():
             band.set_factors(at(values[number]))
@@ -231,8 +233,9 @@ class Cascade:
         self.ladders = [PressureLadder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
 
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
-        """Make the upward pass, separately for each sample: solve all bands at all pressures of their ladders, with the
-        closing of finer bands. Return the rungs of each (band, sample)."""
+        """Make the upward pass, separately for each sample: solve all bands, from the finest, at all pressures of their
+        ladders. Under pressure the mean planes approach, as finer bands are squeezed. Return the results (`Rung`) of
+        each (band, sample)."""
         found: dict[tuple[int, int], list[Rung]] = {}
         laws: dict[int, Constraint] = dict.fromkeys(samples, Box())
         touching = dict.fromkeys(samples, 0.0)
@@ -250,16 +253,17 @@ class Cascade:
         return found
 
     def closing_of(self, number: int, approaches: Sequence[float] | Array) -> tuple[InterfaceLaw, float]:
-        """Return the closing c(p) of a band and all finer bands, from the approaches [m] of the band's rungs, and the
-        approach where c is 0. The residual of the solver may make an approach smaller than the approach under a lower
-        pressure; such an approach is first raised to the larger one."""
+        """Return the law c(p) by which a pressure squeezes a band and all finer bands, from the approaches [m] at the
+        band's mean pressures (rungs), and the approach where c is 0. The residual of the solver may make an approach
+        smaller than the approach under a lower pressure; such an approach is first raised to the larger one."""
         closings = np.maximum.accumulate(approaches)
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
 
     def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
-        """Make the downward pass: distribute the load over the rungs of each band, and return the results of all bands.
-        `solve(band, weights)` returns the rungs of a band whose ladder has these weights."""
+        """Make the downward pass: distribute the load over the mean pressures (rungs) of each band, and return the
+        results of all bands. `solve(band, weights)` returns the results (`Rung`) of a band whose rungs have these
+        weights."""
         weights, found, lost = np.ones(1), list[BandResult](), 0.0
         for number, ladder in enumerate(self.ladders):
             rungs = solve(number, weights)
@@ -291,7 +295,7 @@ class Cascade:
         )
 
     def hard(self, sample: int) -> Results:
-        """Return the results of all bands of a sample if no band has the closing of finer bands (`Box`)."""
+        """Return the results of all bands of a sample if the roughness of finer bands is not squeezed (`Box`)."""
 
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]

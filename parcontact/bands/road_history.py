@@ -96,7 +96,8 @@ class BandMarch:
 
 
 def track_of(rows: Sequence[Rung]) -> Rung:
-    """Return the results at successive places of a history as one `Rung`, whose arrays have the place as first axis."""
+    """Return the results at successive instants of a history as one `Rung`, whose arrays have the instants as first
+    axis."""
     values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
     return Rung(**values, found={})
 
@@ -132,8 +133,8 @@ class RungTask(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """An instant that becomes a row: place in the history, time [s] since the start, distance [m], velocity along x
-    [m/s]."""
+    """An instant that becomes a row: stage and time since its start (`place`), time [s] since the start of the history,
+    distance [m], velocity along x [m/s]."""
 
     place: Place
     time: float
@@ -142,8 +143,9 @@ class Instant(NamedTuple):
 
 
 class ClosingOverTime:
-    """Closing of a band and all finer bands at each instant, from the band's `approaches` [m], shape (rungs, places of
-    `clock`), and from the closing of the `finer` bands."""
+    """Law at each instant by which a pressure squeezes a band and all finer bands: the mean planes approach. It follows
+    from the band's `approaches` [m], shape (mean pressures, instants of `clock`), and from the law of the `finer`
+    bands."""
 
     def __init__(
         self, cascade: Cascade, number: int, clock: BandClock, approaches: Array, finer: "ClosingOverTime | None"
@@ -153,7 +155,7 @@ class ClosingOverTime:
         self._known = dict[Place, tuple[InterfaceLaw, float]]()
 
     def find(self, place: Place) -> tuple[InterfaceLaw, float]:
-        """Return the closing at a place of the history as a law c(p), and the approach [m] at which c is 0."""
+        """Return the law c(p) at an instant of the history, and the approach [m] at which c is 0."""
         if place not in self._known:
             before, after, share = self._clock.between(place)
             found = (1.0 - share) * self._approaches[:, before] + share * self._approaches[:, after]
@@ -213,8 +215,8 @@ class RoadHistory(RoadSliding):
         return self._cascade.store.keep_in(directory, self.job, outputs.MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
-        """Return the marches of each band, from the finest band to the coarsest. The `hard` marches of a band are the
-        last."""
+        """Return the marches of each band, from the finest band to the coarsest. The marches of a band in which finer
+        roughness is not squeezed (`hard`) are the last."""
         found = list[list[RungTask]]()
         for number in reversed(range(self.cut.count)):
             count, half = (len(each.ladders[number].rungs) for each in (self._cascade, self._hard))

@@ -41,11 +41,12 @@ SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 class BandOutcome:
     """Results of all bands.
 
-    `results` are the mean results of all samples, with the closing of finer bands. `with_laws` has friction and
-    corrected area of the first sample with this closing, and `hard` has both without this closing. `scatter` has the
-    standard errors of friction and area, from the differences between surfaces. `rungs` has the rungs of each band,
-    averaged over samples. `line` is True if the surfaces are profiles. `memory` is the error of friction because rungs
-    keep their pressures through a history."""
+    `results` are the mean results of all samples; under pressure finer bands are squeezed. `with_laws` has friction and
+    corrected area of the first sample with this effect, and `hard` has both without it. `scatter` has the standard
+    errors of friction and area, from the differences between surfaces. `rungs` has the results of each band at its mean
+    pressures, averaged over samples. `line` is True if the surfaces are profiles. `memory` is the error of friction
+    because these pressures are constant through a history.
+    """
 
     results: Results
     with_laws: tuple[float, float]
@@ -63,10 +64,11 @@ class BandOutcome:
     def method(self) -> list[float]:
         """Absolute errors of the method in friction and in the corrected area; 0 if there is only one band.
 
-        Each is a share of the difference between the results with and without the closing of finer bands. The least
+        Each is a share of the difference between the results with finer bands that are squeezed, and without. The least
         relative error of friction is LEAST_METHOD, and falls to 0 near full contact. The least relative error of the
         area is the same, or LEAST_OF_AREA times the open share of the area if this is larger. `memory` is added to the
-        error of friction."""
+        error of friction.
+        """
         if len(self.results) == 1:
             return [0.0, 0.0]
         open_share = 1.0 - self.results[-1].contact_area_corrected
@@ -78,7 +80,8 @@ class BandOutcome:
 
 
 class BandLoop(Protocol):
-    """Loop of rounds by which an effect changes bands and finds its results. Its methods are collective.
+    """Iteration by which an effect changes the bands and finds its results. In each round all bands are solved. Its
+    methods are collective.
 
     The function `band_loops(job, cut)` in the module `steady` of an effect yields its loops. Loops that change the
     bands have `moves` = True and share the rounds of one fixed point.
@@ -88,7 +91,7 @@ class BandLoop(Protocol):
     words: tuple[str, str]  # what it changes, and what to try if that does not settle
 
     def begin(self, road: "RoadSliding") -> None:
-        """Begin a new state."""
+        """Prepare the iteration for a new steady state."""
 
     def act(self, road: "RoadSliding") -> None:
         """Set what the effect changes in the bands of the next round."""
@@ -101,7 +104,7 @@ class BandLoop(Protocol):
         """Choose what the effect changes in the next round; raises RunError."""
 
     def found(self, road: "RoadSliding", point: Point, results: Results, changes: tuple[float, float]) -> Point:
-        """Return the point of a state with the results of the effect added."""
+        """Return the point of a steady state with the results of the effect added."""
 
     def values(self, results: Results) -> Mapping[str, Sequence[float]]:
         """Return the values of the effect's columns of bands.csv, one for each band."""
@@ -238,7 +241,7 @@ class RoadSliding:
 
     @property
     def place(self) -> tuple[Vector, float]:
-        """The velocity [m/s] and the pressure [Pa] of the present state."""
+        """The velocity [m/s] and the pressure [Pa] of the present steady state."""
         return self._cascade.velocity, self._cascade.pressure
 
     @property
@@ -252,7 +255,7 @@ class RoadSliding:
         return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors of the moduli of each wave of a band to `at(values[band])`."""
+        """Set the factors by which the moduli are multiplied for each wave of a band: `at(values[band])`."""
         self._cascade.set_factors(at, values)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:

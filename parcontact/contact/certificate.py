@@ -1,4 +1,4 @@
-"""The certificate of a contact pressure, which states how far the pressure is from the solution.
+"""The error of a contact pressure, stated from the pressure alone: its certificate.
 
 A `records.Certificate` follows from sums over pressures and gaps. Gaps are divided by a reference length, so that the
 errors have no unit.
@@ -25,8 +25,8 @@ class Lines:
 
     `axis` is the axis of maps, 0 or 1, along which the lines run. `contrast` c is the modulus of waves that vary along
     the lines, divided by the modulus of waves that do not. An error of the gap that varies along the lines causes a
-    pressure c times as large as other errors of the gap cause. The length of the certificate is therefore multiplied by
-    the factor s,
+    pressure c times as large as other errors of the gap cause. The length by which gaps are divided (`Certificate`) is
+    therefore multiplied by the factor s,
 
         s^2 = v + (1 - v)/c^2.
 
@@ -120,7 +120,7 @@ def certify(
     working: NDArray[np.bool_],
 ) -> tuple[float, float, Certificate]:
     """Set `working` to True at the points that the solver changes next, and to False elsewhere. Return the number of
-    these points, the sum of their gaps, and the certificate of p; collective.
+    these points, the sum of their gaps, and the errors of p (`Certificate`); collective.
 
     u is the displacement under p at the approach of `iterate`. `mean` is the prescribed mean pressure, or None if the
     approach is given. `height` is the height of the surface.
@@ -154,8 +154,8 @@ def _approaches(slab: Slab, box: Box, p: Array, u: Array, h: Array) -> tuple[flo
 
 @dataclass(frozen=True)
 class Judge:
-    """Certifies pressures p >= 0 on one grid. `height` is the height of the surface. `lines` is None unless the modulus
-    of the body depends on the direction of waves (`Lines`)."""
+    """States the errors of pressures p >= 0 on one grid. `height` is the height of the surface. `lines` is None unless
+    the modulus of the body depends on the direction of waves (`Lines`)."""
 
     slab: Slab
     height: float
@@ -164,8 +164,8 @@ class Judge:
     def certify(
         self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
     ) -> tuple[float, Certificate]:
-        """Return the approach and the certificate of an admissible pressure p with displacement u. Set `working` to
-        True at the points that a solver changes next, and to False elsewhere. Collective."""
+        """Return the approach of an admissible pressure p with displacement u, and its errors (`Certificate`). Set
+        `working` to True at the points that a solver changes next, and to False elsewhere. Collective."""
         slab, given = self.slab, isinstance(control, Approach)
         iterate = form_iterate(slab, Box(), p, u, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
@@ -176,7 +176,6 @@ class Judge:
 
 
 def describe_failure(reason: str, certificate: Certificate, tolerance: float) -> str:
-    """Return a sentence with the reason of a failed solve and the largest error in its certificate; '' if the tolerance
-    is met."""
+    """Return a sentence why a solve failed, with the largest error that it reached; '' if the tolerance is met."""
     worst = certificate.worst
     return "" if worst <= tolerance else f"{reason}: the residual is {worst:.3g} where {tolerance:.3g} was asked for"

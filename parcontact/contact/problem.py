@@ -192,7 +192,8 @@ STEPS = 6  # accuracy: linear pieces in each interval of a table, equal in the l
 
 @dataclass(frozen=True)
 class InterfaceLaw:
-    """Closing c(p) of an interface, piecewise linear with c(0) = 0, and constant beyond the last point.
+    """Approach c(p) of the mean planes in an interface under a pressure, the closing: piecewise linear with c(0) = 0,
+    and constant beyond the last point.
 
     `pressures`, shape (n,), rise from 0, and `closings`, of the same shape, do not fall. Both may have any unit.
     """
@@ -227,7 +228,7 @@ class InterfaceLaw:
         return InterfaceLaw(self.pressures / pressure, self.closings / length)
 
     def closing(self, p: Array) -> Array:
-        """Return the closing c(p), an array of the shape of p."""
+        """Return the approach c(p) of the mean planes, an array of the shape of p."""
         found, pressed = np.zeros(p.shape), p > 0.0
         found[pressed] = np.interp(p[pressed], self.pressures, self.closings)
         return found
@@ -338,8 +339,8 @@ class Contact:
     """Result of a solve that has converged or was given up. Maps have the shape (rows of this rank, nx).
 
     `p` is the array that was passed as the start. `u = A p` is an array of the solver, overwritten by the next solve.
-    `d` is the approach, and `certificate` holds the errors of p. `failure` is empty, or states why the tolerance was
-    not reached.
+    `d` is the approach, and `certificate` has the errors of p. `failure` is empty, or states why the tolerance was not
+    reached.
     """
 
     p: Array
@@ -366,7 +367,7 @@ def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.f
 
 
 def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compliance: float, length: float) -> float:
-    """Return the smallest error that a certificate can have because of rounding, with gaps divided by `length`;
+    """Return the smallest error of a solve that can be stated because of rounding, with gaps divided by `length`;
     collective.
 
     `lengths` are maps of heights and of displacements. `compliance` is the largest displacement per pressure: a

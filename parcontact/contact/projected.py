@@ -56,8 +56,8 @@ class Projected:
 
     def solve(self, h: Array, mean: float, p: Array, tolerance: float, patience: int) -> Contact:
         """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
-        everywhere is replaced by a uniform pressure. Give up if the certificate does not halve in `patience` steps.
-        Collective."""
+        everywhere is replaced by a uniform pressure. Give up if the error (`Certificate`) does not halve in `patience`
+        steps. Collective."""
         steps, best, since = 0, math.inf, 0
         try:
             d, certificate = self._begin(h, mean, p)

@@ -69,7 +69,7 @@ class ContactSolver:
 
     * workspace: maps for all intermediate results;
     * height: height of the surface, from its lowest to its highest point [unit of h];
-    * tolerance: largest error that a certificate may have;
+    * tolerance: largest error with which a solve ends (`records.Certificate`);
     * max_iterations: limit on the iterations of a solve;
     * grids: coarser grids for the extension of residuals (`preconditioner.grids_for`);
     * free: True for a box that does not repeat;
@@ -132,8 +132,8 @@ class ContactSolver:
                 slope = 0.0
 
     def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
-        """Scale the admissible pressure p to the load, and return the contact with its certificate; collective. If the
-        certificate exceeds the tolerance of the solver, `failure` of the contact is the text `otherwise`."""
+        """Scale the admissible pressure p to the load, and return the contact with its errors (`Certificate`);
+        collective. If they exceed the tolerance of the solver, `failure` of the contact is the text `otherwise`."""
         iterate = self._begin(problem, p)
         *_, certificate = self._certify(problem, p, iterate)
         failure = "" if certificate.worst <= self.tolerance else otherwise

@@ -180,10 +180,10 @@ class Splitting:
     """Solver of steady contact by accelerated splitting on one grid.
 
     `operator` is A of a periodic box: the symbol of the padded operator of a free box may have a negative real part at
-    some waves. `inverse` is an operator K that is close to the inverse of A. `tolerance` limits the errors of the
-    certificate, and `most` the number of steps of a solve. Interface laws and pressures are in the units of A. The
-    solver holds two maps, a byte for each point, and the maps of `Acceleration`. During a solve, the solver also holds
-    the symbol of `resolvent`.
+    some waves. `inverse` is an operator K that is close to the inverse of A. `tolerance` limits the errors of a
+    solution (`Certificate`), and `most` the number of steps of a solve. Interface laws and pressures are in the units
+    of A. The solver holds two maps, a byte for each point, and the maps of `Acceleration`. During a solve, the solver
+    also holds the symbol of `resolvent`.
     """
 
     def __init__(self, judge: Judge, operator: Convolution, inverse: Operator, tolerance: float, most: int) -> None:
@@ -205,7 +205,7 @@ class Splitting:
 
         `tolerance` replaces the tolerance of the solver. A start that is 0 everywhere is replaced by K h less a
         constant, limited to the bounds and scaled to a given mean pressure, which must be positive. The displacement of
-        the result is `u = A p`, without the closing.
+        the result is `u = A p`, without the approach c(p) of the mean planes.
         """
         given, p, steps = _Given(h, control, law, tolerance or self.tolerance), start, 0
         cold = self._begin(given, p)
@@ -349,7 +349,7 @@ class SteadySolver:
 
     * operator: A of the body;
     * preconditioner: K, which is close to the inverse of A;
-    * tolerance: largest error that a certificate may have;
+    * tolerance: largest error with which a solve ends (`records.Certificate`);
     * most: limit on the steps of `Splitting`;
     * grids: coarser grids of projected steps (`preconditioner.grids_for`).
     """

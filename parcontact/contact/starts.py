@@ -60,7 +60,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """An object with the `slab` of a grid, such as a level in `descend`."""
+    """An object with the part of a grid on this rank (`slab`), such as a level in `descend`."""
 
     @property
     def slab(self) -> Slab: ...
@@ -113,8 +113,8 @@ class Found:
 
 
 def is_block_grid(slab: Slab, finest: Slab) -> bool:
-    """Return True if a grid is coarse enough to be a grid of blocks: its longer side has at most BLOCKS points, or at
-    most as many points as the longer side of the `finest` grid has tiles."""
+    """Return True if a grid is so coarse that its points serve as blocks, which may touch or not: its longer side has
+    at most BLOCKS points, or at most as many points as the longer side of the `finest` grid has tiles."""
     longest = max(slab.nx, slab.ny)
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
@@ -122,7 +122,7 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, box: Box
 ) -> Tiles | None:
-    """Return the tiles of a grid that may touch; None if no tile may touch, or if the tiles hold more than
+    """Return the squares of a grid (tiles) that may touch; None if no tile may touch, or if the tiles hold more than
     LARGEST_SHARE of the points. Collective.
 
     `slab` is the part of the grid on this rank, with its `heights`, and `below` is the contact on the next coarser
@@ -164,8 +164,8 @@ def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles:
 
 
 class OnTheseTiles:
-    """A contact problem on tiles of a grid. Its methods solve the problem and check the solution. Only root has the
-    operators on the tiles."""
+    """A contact problem on some squares of a grid, the tiles. Its methods solve the problem and check the solution.
+    Only root has the operators on the tiles."""
 
     def __init__(self, tiles: Tiles, solver_on: SolverOnTiles, problem: Problem, slab: Slab, height: float) -> None:
         self._tiles, self._solver_on, self._problem, self._slab = tiles, solver_on, problem, slab
@@ -194,7 +194,7 @@ class OnTheseTiles:
         return Found(slab, p, d, length)
 
     def check(self, solver: ContactSolver, p: Array) -> Contact | None:
-        """Return the contact of the solution p if its certificate, over all points of the grid, meets the tolerance of
+        """Return the contact of the solution p if its errors over all points of the grid meet the tolerance of
         `solver`; else None. Collective.
 
         The displacement is computed by the operators on tiles. For tolerances below FINEST the result is therefore

@@ -167,8 +167,8 @@ class Planner:
             yield from self._describe(part, slab, trials * len(parts))
 
     def plan_sweep(self, cases: Sequence[Case], groups: Groups) -> Iterator[str]:
-        """Yield the lines of the plan of all cases of a sweep; collective like `plan`. Each group of ranks runs one
-        case at a time."""
+        """Yield the lines of a plan for all cases of a sweep; collective like `plan`. Each group of ranks runs one case
+        at a time."""
         first, slab, tries = cases[0], Slab(groups.comm, *cases[0].job.grid.points), cases_to_try(len(cases))
         yield f"first of {len(cases)} cases: {', '.join(f'{key} = {value}' for key, value in first.settings.items())}"
         yield ""

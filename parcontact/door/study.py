@@ -493,7 +493,7 @@ class StudyCurve:
     seconds: Sequence[float]
 
     def over(self, x: Array) -> Line:
-        """Return the line of the errors [%] against the values x."""
+        """Return the curve of the errors [%] against the values x."""
         mark, dashes = MARKS[self.ladder]
         look = {"color": COLORS[self.integrator], "marker": mark, "linestyle": dashes}
         return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)

@@ -27,9 +27,9 @@ XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which 
 
 
 class SavedMaps:
-    """The maps that a file holds at its places. Places are the instants of a run, whose step numbers are `steps`, or
-    the points of a curve. `marks` maps the name of a coordinate, such as time or velocity, to its values at all places.
-    Raises ValueError if datasets have different numbers of places."""
+    """The maps in a file, one of each kind at each place. Places are the instants of a run, whose step numbers are
+    `steps`, or the points of a curve. `marks` maps the name of a coordinate, such as time or velocity, to its values at
+    all places. Raises ValueError if datasets have different numbers of places."""
 
     def __init__(self, file: h5py.File) -> None:
         over_time = "t" in file
@@ -63,8 +63,8 @@ class SavedMaps:
 
 
 class GrowingMaps:
-    """A file of maps of shape (place, y, x). Its space is laid out for all places before the first map is saved.
-    Collective.
+    """A file of maps of shape (place, y, x), whose places are instants of a run or points of a curve. Its space is laid
+    out for all places before the first map is saved. Collective.
 
     To save a place, its maps are written first, and then its coordinates, which are NaN before. So a killed run leaves
     a readable file. `path` is the path of the file, `slab` the rows of this rank, and `size` the size of the box (lx,
@@ -81,7 +81,7 @@ class GrowingMaps:
     def replace_file(
         self, kind: str, count: int, found: SavedMaps | None, kept: Mapping[int, int], steps: list[int] | None = None
     ) -> None:
-        """Create a new file for `count` places. Collective.
+        """Create a new file for `count` instants of a run or points of a curve (places). Collective.
 
         `kind` is `KIND` or `KIND_OF_STEADY_MAPS`. For a run, `steps` are the step numbers of all its instants, also of
         those that are not reached yet; for a curve, `steps` is None. Places of the present file `found` are copied:

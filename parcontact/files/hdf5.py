@@ -232,8 +232,8 @@ def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], mar
 
 
 def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
-    """Set coordinates of one place, or of all places that `index` selects. Collective. Places are instants or points.
-    `marks` maps the names of the coordinates to their values; NaN marks a place whose maps are not saved."""
+    """Set coordinates of one instant of a run or point of a curve, or of all that `index` selects. Collective. `marks`
+    maps the names of the coordinates to their values; NaN means that maps are not saved there."""
 
     def act() -> None:
         with h5py.File(path, "r", locking=False) as file:

@@ -313,8 +313,8 @@ class ErrorBudget:
         return replace(self, friction=friction)
 
     def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
-        """Return the budget of the last round of a fixed point. `friction` and `area` are the relative changes of
-        friction and area in this round. They are added to the errors of the solver."""
+        """Return the budget of the last iteration of a fixed point. `friction` and `area` are the relative changes of
+        friction and area in this iteration. They are added to the errors of the solver."""
         own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
         return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
 

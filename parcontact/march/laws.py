@@ -69,7 +69,7 @@ class DetachedError(Exception):
 
 
 def accepts(scene: Scene, contact: Contact) -> bool:
-    """Return True if `numerics.accept_unconverged` is set and the certificate of an unconverged contact is finite."""
+    """Return True if `numerics.accept_unconverged` is set and the errors of an unconverged contact are finite."""
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
@@ -268,7 +268,8 @@ MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contac
 
 
 class ClosingLaw(DryLaw):
-    """Contact law with a closing c [m] that depends on the pressure [Pa] at the end of a step, without memory.
+    """Contact law of an interface whose mean planes approach by c [m] under pressure, as finer roughness is squeezed
+    (the closing). c depends on the pressure [Pa] at the end of a step, without memory.
 
     Raises InputError unless the body is a periodic half space without a hardness.
     """

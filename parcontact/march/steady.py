@@ -93,8 +93,9 @@ class Point:
 
 
 def in_rounds(points: Sequence[Point]) -> Point:
-    """Return the last of several points, which were solved one after the other in the rounds of a fixed point. Its cost
-    is the cost of all rounds. The relative changes of friction and area in the last round are added to its errors."""
+    """Return the last of several points, which were solved one after the other in the iterations of a fixed point. Its
+    cost is the cost of all iterations. The relative changes of friction and area in the last one are added to its
+    errors."""
     *_, before, last = [*points[-1:], *points]
     friction, area = (
         abs(one - other) / one if one > 0.0 else 0.0
@@ -179,9 +180,9 @@ class SteadyLevel:
 class SteadySliding:
     """Solver of the steady states of one job's surface and body; the constructor and the methods are collective.
 
-    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on the
-    certificates of solves follows from the tolerance of the job and is at most `most`. Raises InputError for a body
-    that has a memory but no branches.
+    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The error with which
+    solves end follows from the tolerance of the job and is at most `most`. Raises InputError for a body that has a
+    memory but no branches.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -222,7 +223,7 @@ class SteadySliding:
         """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
         An effect may repeat the solve until its own unknowns settle, by a loop in its module `steady`. Raises RunError,
-        with the certificate reached, if no start leads to a solution, or if a loop does not settle.
+        with the error reached, if no start leads to a solution, or if a loop does not settle.
         """
         solve = self._solve
         for loop in self.loops:
@@ -400,8 +401,8 @@ def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
 
 
 def tolerance_of(asked: float, free: bool = False) -> float:
-    """Return the limit on the certificate of a steady state, for the tolerance `asked` of the job. `free` is True for a
-    free box."""
+    """Return the largest error (`Certificate`) with which the solve of a steady state ends, for the tolerance `asked`
+    of the job. `free` is True for a free box."""
     return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 

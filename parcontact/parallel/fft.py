@@ -78,7 +78,8 @@ LEG_BYTES = 1 << 19  # tuning: bytes of the spectrum of a rank for each leg, if 
 
 
 class Leg:
-    """One leg of the exchange, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
+    """One of the parts (legs) in which ranks exchange data: from blocks of rows to the `spectrum`, which has all rows
+    of this rank's x-wavenumbers, or back.
 
     Parameters: `dealt` has the x-wavenumbers of each rank, and `rows` the rows of each rank in this leg, counted in the
     whole map; `wire` is the buffer of messages to other ranks.
@@ -447,7 +448,7 @@ def from_map(fft: FFT, field: Array, rest: Array, out: Spectrum) -> None:
 
 
 def to_rows(fft: FFT, spectrum: Spectrum) -> NDArray[np.complexfloating]:
-    """Return all columns of this rank's rows of a spectrum of the size of maps; collective."""
+    """Return this rank's rows of a spectrum, with all columns; the spectrum has the size of maps. Collective."""
     slab = fft.slab
     parts = slab.comm.alltoall([np.ascontiguousarray(spectrum[rows]) for rows in slab.dealt])
     return np.concatenate(parts, axis=1)

@@ -232,9 +232,9 @@ LONGEST_CELL = 2.0  # tuning: largest ratio of sides of a cell for which tiles a
 
 @dataclass(frozen=True)
 class Tiles:
-    """Some of the tiles into which a grid of `points = (nx, ny)` is divided. `rows` and `columns` are the places of the
-    tiles in the division, each of shape (number of tiles,). The last tiles along x and y may be cut at the end of the
-    grid."""
+    """Some of the squares of SIDE x SIDE points (tiles) into which a grid of `points = (nx, ny)` is divided. `rows` and
+    `columns`, each of shape (number of tiles,), count tiles along y and x. The last tiles along x and y may be cut at
+    the end of the grid."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
@@ -390,8 +390,8 @@ GAUSS = 0.5 / math.sqrt(3.0)  # two-point Gauss rule over a cell
 class TileOperator:
     """Operator from pressure to displacement on tiles.
 
-    `near` has the coefficients of the first part of 1/r, as split in the module, at distances along y and x from 0 up;
-    `nodes` computes the displacement by the second part.
+    1/r is split into two parts, as in the module. `near` has the coefficients of the first part at distances along y
+    and x from 0 up; `nodes` computes the displacement by the second part.
     """
 
     def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes", tally: Tally) -> None:

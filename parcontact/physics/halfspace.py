@@ -468,14 +468,15 @@ class HalfSpace:
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Return True if operators on tiles exist: for a half space in a free box whose cells are not long."""
+        """Return True if operators on squares of the grid (tiles) exist: for a half space in a free box whose cells are
+        not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
         return (
             self.free and not self.repeats_along_x and self.other is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
         )
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
-        """Return the operator of a free half space on tiles of its grid, and a preconditioner for it."""
+        """Return the operator of a free half space on some squares of its grid (tiles), and a preconditioner for it."""
         operator = free_operator(tiles, self.size, self.poisson, self.response.coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 

@@ -114,7 +114,7 @@ class Certificate:
         return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
 
     def shortened(self, share: float) -> "Certificate":
-        """Return the certificate for gaps divided by `share` times the length."""
+        """Return the errors that follow if gaps are divided by `share` times the length."""
         gaps = self.complementarity / share, self.penetration / share
         return replace(self, complementarity=gaps[0], penetration=gaps[1], length=share * self.length)
 

@@ -239,8 +239,8 @@ def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list
     """Return the panels that several runs have in common, with the lines of all runs; `least` is the number of runs
     that must have a panel.
 
-    Each run has one colour. Lines of one run are distinguished by marks, and bars of one run by shades of its colour.
-    If no run has several lines in a panel, runs are distinguished by colour and dashes.
+    Each run has one colour. Curves of one run are distinguished by symbols, and bars of one run by shades of its
+    colour. If no run has several lines in a panel, runs are distinguished by colour and dashes.
     """
     found: dict[tuple[str, Axis, Axis], list[tuple[int, Panel]]] = {}
     for number, (_, panels) in enumerate(runs):

@@ -224,8 +224,8 @@ VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an 
 @dataclass(frozen=True)
 class Abscissa:
     """The horizontal axis of a run's panels, with SI `values` in some `rows` of the run (None: all rows). `shades` are
-    the ranges of its stages. Points have marks if `marked` is True. `loop` is True for loads and approaches, which may
-    return to earlier values."""
+    the ranges of its stages. Points are drawn as dots if `marked` is True. `loop` is True for loads and approaches,
+    which may return to earlier values."""
 
     axis: Axis
     values: Array

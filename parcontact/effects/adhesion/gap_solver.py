@@ -166,8 +166,8 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 @loop
 def certificate_sums(working, g, h, q, mean, sigma, z):
-    """Return six sums for the certificate of a gap: of w, w u and w u^2 over all points, and of w |z|, |c| and c over
-    the working set.
+    """Return six sums from which the error of a gap follows: of w, w u and w u^2 over all points, and of w |z|, |c| and
+    c over the working set.
 
     u is the displacement `g + h`. c is the residual `p + sigma` on the working set and 0 elsewhere, with the pressure
     `p = q + mean`, and z the preconditioned residual. The weight w of a point is |p| + |c|.

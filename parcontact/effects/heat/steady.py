@@ -100,8 +100,8 @@ def find_temperatures(
 
 class Feedback:
     """Search for the flash temperature with feedback: rubber that relaxes at this temperature is warmed to this
-    temperature by its own heat. The first round is for cold rubber. If only the velocity differs from that of the last
-    state, the second round starts from the flash temperature of that state."""
+    temperature by its own heat. The first iteration is for cold rubber. If only the velocity differs from that of the
+    last steady state, the second iteration starts from the flash temperature of that state."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
@@ -157,8 +157,8 @@ class HeatLoop:
         self.fields: dict[str, Array] = {}
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
-        """Return the steady state with its temperatures; collective. `solve` returns a state for the present `setup` of
-        `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
+        """Return the steady state of sliding with its temperatures; collective. Each call of the argument `solve`
+        calculates a steady state with the moduli in `sliding.setup` (`march.steady.SteadySliding`). Raises RunError."""
         if self._section.feedback == "none":
             return self._heat(sliding, solve(velocity, pressure))
         cold = self._own if math.isnan(sliding.temperature) else sliding.temperature
@@ -320,8 +320,8 @@ def flash_of_bands(
     rises: Sequence[float], heats: Sequence[float], rounds: int = 1, friction_cold: float = math.nan
 ) -> Flash:
     """Return the temperatures of a contact from the `rises` [K] of its bands: the mean and the quartiles, weighted by
-    `heats`, and the highest rise of a band. The result also stores the number of `rounds` in which the rises were
-    found, and the friction of cold rubber, `friction_cold`."""
+    `heats`, and the highest rise of a band. The result also stores the number of iterations in which the rises were
+    found (`rounds`), and the friction of cold rubber, `friction_cold`."""
     order = np.argsort(rises)
     values, weights = np.asarray(rises)[order], np.asarray(heats)[order]
     whole = float(weights.sum())
@@ -407,8 +407,8 @@ class HeatOfBands:
         return bool(np.all(self._settled))
 
     def move(self, road: RoadSliding, results: Results) -> None:
-        """Set the temperature rises of the next round. Raises RunError if the rises cannot settle below the end of the
-        shift's range."""
+        """Set the temperature rises of the next iteration. Raises RunError if the rises cannot settle below the end of
+        the shift's range."""
         over, last, most = self._over, self._last, self._highest - road.own_temperature
         at_most = (self._rises == most) & (over > 0.0)
         if not np.all(self._settled) and np.all(self._settled | at_most):

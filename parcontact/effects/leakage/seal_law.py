@@ -109,8 +109,8 @@ def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Fil
 
 
 class Verdict(NamedTuple):
-    """Verdict on a round: `settled` is True if the rounds have settled, and `lifted` is True if the fluid lifts the
-    seal off. `change` is the estimated relative error of the flow."""
+    """Verdict on an iteration between contact and flow: `settled` is True if it has settled, and `lifted` is True if
+    the fluid lifts the seal off. `change` is the estimated relative error of the flow."""
 
     settled: bool
     lifted: bool
@@ -118,8 +118,8 @@ class Verdict(NamedTuple):
 
 
 class Rounds:
-    """The rounds of one step for a pressure drop on a box of `size` (lx, ly) [m]. The object keeps the maps of earlier
-    rounds, and lives on root only."""
+    """Iterations between contact and flow (rounds) in one step, for a pressure drop on a box of `size` (lx, ly) [m].
+    The object keeps the maps of earlier rounds, and lives on root only."""
 
     def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
         self._drop, self._size, self.count = drop, size, 0

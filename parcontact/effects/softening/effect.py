@@ -50,8 +50,8 @@ class StrainTable:
 
     @staticmethod
     def mixed(found: ArrayLike, before: ArrayLike) -> Array:
-        """Return the strains for the next round, from the strains `found` in this round and the strains `before` it.
-        Where no strain was found (NaN or 0), the strain before stays."""
+        """Return the strains for the next iteration, from the strains `found` in this iteration and the strains
+        `before` it. Where no strain was found (NaN or 0), the strain before stays."""
         new, old = np.asarray(found, float), np.asarray(before, float)
         return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
 

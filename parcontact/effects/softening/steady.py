@@ -209,7 +209,8 @@ MOST_ROUNDS = 40  # tuning: limit on rounds
 
 @dataclass(frozen=True)
 class Round:
-    """Result of one round: the friction coefficient, and for each octave its strain [-] and its power."""
+    """Result of one iteration between strains and moduli: the friction coefficient, and for each octave of wavelengths
+    its strain [-] and its power."""
 
     friction: float
     strains: Array
@@ -223,8 +224,8 @@ class Round:
 
 
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
-    """Solve rounds until friction changes by less than the fraction SHARE of `accuracy`, or until the factors of the
-    moduli do not change. The first round uses the factors of `first`. Raises RunError if friction does not settle."""
+    """Iterate until friction changes by less than the fraction SHARE of `accuracy`, or until the factors of the moduli
+    do not change. The first iteration uses the factors of `first`. Raises RunError if friction does not settle."""
     softened, last = first, math.nan
     for _ in range(MOST_ROUNDS):
         found = solve(softened)
@@ -238,7 +239,8 @@ def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float)
 
 
 class StrainLoop:
-    """Loop that finds the strains of the octaves on one grid; each state starts from the strains of the last state."""
+    """Loop that finds the strains of the octaves of wavelengths on one grid; each steady state starts from the strains
+    of the last one."""
 
     fields: ClassVar[Mapping[str, Array]] = {}
 
@@ -335,8 +337,8 @@ def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
 class StrainsOfBands:
     """The loop that finds the strains of bands.
 
-    The strain for the next round is a power mean of the old and the new strain of a band. The first round of a state
-    starts from the strains of the last state.
+    The strain for the next iteration is a power mean of the old and the new strain of a band. A steady state starts
+    from the strains of the last one.
     """
 
     moves = True
@@ -348,7 +350,7 @@ class StrainsOfBands:
         self._enough = SHARE * job.numerics.asked.both[0]
 
     def begin(self, road: RoadSliding) -> None:
-        """Do nothing: a new state starts from the strains of the last state."""
+        """Do nothing: a new steady state starts from the strains of the last one."""
 
     def act(self, road: RoadSliding) -> None:
         road.set_factors(self._table.at, self._strains.tolist())

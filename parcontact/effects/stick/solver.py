@@ -257,8 +257,8 @@ def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
 
 @loop
 def change_since(bound, x, y, last_x, last_y, factor):
-    """Return the sum of the magnitudes of the changes of tractions since the last step, over points in contact, and the
-    sum of the magnitudes of the last tractions. The last tractions are `factor` times (last_x, last_y)."""
+    """Return two sums over points in contact: by how much tractions have changed since the last step, and how large the
+    last tractions were (magnitudes of vectors). The last tractions are `factor` times (last_x, last_y)."""
     change, size = 0.0, 0.0
     for j in range(bound.shape[0]):
         row_change, row_size = 0.0, 0.0
@@ -405,7 +405,8 @@ Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t 
 class TractionProblem(NamedTuple):
     """Input of a solve. `bound` is the map of the bounds f. `aim` is the map of the displacements e at which points
     that stick end, with stacked components. `kappa` is a stiffness of the contact, in the unit of tractions divided by
-    the unit of displacements. `tolerance` is the largest certificate of a solution."""
+    the unit of displacements. `tolerance` is the largest relative error with which a solve ends (the certificate of the
+    module)."""
 
     bound: Array
     aim: Array
