@@ -226,3 +226,13 @@ def test_the_shortest_time_is_of_a_branch_with_a_map() -> None:
     series = Prony(1.0, np.array([1.0, 1.0, 1.0, 1.0]), np.array([1e-3, 1e-2, 1e-1, 1.0]))
     assert ZenerBody(POINT, series, "exponential", memoryless=[0], frozen=[3]).shortest_time == 1e-2
     assert ZenerBody(POINT, series, "exponential", memoryless=[0, 1, 2, 3]).shortest_time == np.inf
+
+
+def test_branches_that_the_saved_run_had_without_maps() -> None:
+    """A frozen one begins as G u, one without memory as 0, and one with a map as it was read."""
+    series = Prony(1.0, np.array([2.0, 3.0, 5.0]), np.array([1e-3, 1e-2, 1e-1]))
+    made = ZenerBody(POINT, series, "exponential")
+    memory = made.at_rest()
+    made.start_from(memory, np.full((1, 1), 0.5), [np.full((1, 1), 7.0)] * 3)
+    saved = {"branch 1": np.full((1, 1), 7.0), "frozen": np.array([False, False, True])}
+    assert made.restored(memory, saved).branches[:, 0, 0].tolist() == [0.0, 7.0, 2.5]
