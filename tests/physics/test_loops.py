@@ -31,6 +31,20 @@ def roll(field: np.ndarray, offset: int) -> np.ndarray:
     return np.roll(field, offset, axis=1)
 
 
+@pytest.mark.parametrize("count", [0, 3, 4, 9])
+def test_begin(count: int) -> None:
+    """Any number of branches, of which the loop takes four at once."""
+    random = np.random.default_rng(count)
+    branches, (du, buffer, u, heights) = random.normal(size=(count, NY, NX)), maps(4)
+    decay, gain, back, weight = random.normal(size=(4, count, 1, 1))
+    advanced = decay * branches + gain * du + back * buffer
+    expected = roll(heights, 3) + (weight * advanced).sum(axis=0) - 0.3 * u + 0.7 * du
+    coefficients = (each[:, 0, 0].copy() for each in (decay, gain, back))
+    loops.begin(branches, *coefficients, du, buffer, weight[:, 0, 0].copy(), 0.3, 0.7, u, heights, 3)
+    assert_allclose(branches, advanced, atol=1e-14)
+    assert_allclose(buffer, expected, atol=1e-14)
+
+
 @pytest.mark.parametrize("shift", OFFSETS)
 def test_travel(shift: int) -> None:
     """A pressure that grows evenly while it moves goes on so; where it would become negative it is 0."""
