@@ -76,9 +76,8 @@ def folders() -> tuple[ModuleType, ...]:
 
 
 def needs_of(thing: Any) -> tuple[Collection[str], Collection[str]]:
-    """Return the names of quantities of a step that a capability gives to other capabilities, and the names of
-    quantities that it uses from other capabilities (`GIVES` and `USES` of its package, or of the class of its effect).
-    """
+    """Return the names of the quantities that a capability gives to others in a step, and of those that it uses from
+    others (`GIVES` and `USES` of its package, or of the class of its effect)."""
     return getattr(thing, "GIVES", ()), getattr(thing, "USES", ())
 
 

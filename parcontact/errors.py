@@ -40,7 +40,8 @@ class RunError(Exception):
 
 
 class UnsolvedError(RunError):
-    """A steady state that cannot be solved: its `place` as text, and the `reason`."""
+    """A steady state that cannot be solved. `place` names its velocity, pressure and temperature, and `reason` says
+    why."""
 
     def __init__(self, place: str, reason: str) -> None:
         super().__init__(f"{place}: {reason}")

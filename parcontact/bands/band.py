@@ -185,7 +185,7 @@ class Band:
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
     def set_factors(self, factors: Any) -> None:
-        """Set the factors of the moduli of each wave (`physics.halfspace.HalfSpace.factors`)."""
+        """Set the function that returns factors of the moduli for all waves (`physics.halfspace.HalfSpace.factors`)."""
         self._set_up(replace(self.setup, factors=factors))
 
     def slide(self, velocity: Vector) -> None:
@@ -355,13 +355,13 @@ class BandClock:
         self.places = [*begins, *map(self.place, timeline)]
 
     def place(self, step: Step) -> Place:
-        """Return the place of a step of the band in the history of the job."""
+        """Return the stage of the job in which a step of the band ends, and the time since this stage began."""
         number = self._owners[step.stage]
         return Place(number, step.time - self._starts[number])
 
     def between(self, at: Place) -> tuple[int, int, float]:
-        """Return the numbers of the steps before and after a place, and the weight of the step after in results that
-        are interpolated between the two steps.
+        """Return the numbers of the steps before and after an instant of the job (`Place`), and the weight of the step
+        after in results that are interpolated between the two steps.
 
         The interpolation is linear in the slip of a slide, and in the logarithm of the time of a rest. Beyond the last
         step of a stage results are constant; before the first step they are the last results of the stage before.

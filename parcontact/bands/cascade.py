@@ -73,7 +73,7 @@ class ContactStore:
         return [rung or solved[number] for number, rung in enumerate(known)]
 
     def clear(self) -> None:
-        """Remove all contacts. The caller has written the point of the curve to which they belong."""
+        """Remove all contacts, once the point of the curve to which they belong is written."""
         self._known = {}
         if self._path.name:
             self._on_root(lambda: self._path.unlink(missing_ok=True))
@@ -132,12 +132,12 @@ class Task(NamedTuple):
 class BandResult:
     """Result of one band under a distribution of pressure.
 
-    `weights` are the weights W_j of the rungs, and `load` is the sum of W_j p_j [Pa]. `friction` is the force of the
-    band's waves over the whole load, from the dissipated power, and `friction_slopes` is this ratio from the pressures
-    on slopes. Contact areas are shares of the nominal area, resolved down to the band's shortest wave. `load_lost` is
-    the share of the load above the ladder. `powers` [W/m^2] are lost in each branch. `found` has the arrays of effects
-    (`band.Probe`), averaged over the ladder. `errors`, shape (6,), are the absolute errors of friction by solver, time
-    steps and grid, followed by the errors of area.
+    The band is solved at mean pressures p_j (rungs). `weights` are their weights W_j, and `load` is the sum of W_j p_j
+    [Pa]. `friction` is the force of the band's waves over the whole load, from the dissipated power, and
+    `friction_slopes` is this ratio from the pressures on slopes. Contact areas are shares of the nominal area, resolved
+    down to the band's shortest wave. `load_lost` is the share of the load above the ladder. `powers` [W/m^2] are lost
+    in each branch. `found` has the arrays of effects (`band.Probe`), averaged over the ladder. `errors`, shape (6,),
+    are the absolute errors of friction by solver, time steps and grid, followed by the errors of area.
     """
 
     weights: Array
@@ -164,17 +164,18 @@ class Shares(NamedTuple):
 
 
 def by_load(shares: Shares) -> Array:
-    """Return the weight of each rung: its share of the load."""
+    """Return the weight of each mean pressure (rung): its share of the load."""
     return shares.loads / shares.loads.sum()
 
 
 def by_square(shares: Shares) -> Array:
-    """Return the weight of each rung: its load times its pressure, over the square of the road's mean pressure."""
+    """Return the weight of each mean pressure p_j (rung): its load times p_j, over the square of the road's mean
+    pressure."""
     return shares.loads * shares.pressures / shares.mean**2
 
 
 def by_power(shares: Shares) -> Array:
-    """Return the weight of each rung: its share of the power; 0 if no rung has power."""
+    """Return the weight of each mean pressure (rung): its share of the power; 0 if there is no power."""
     weights = np.maximum(shares.power, 0.0)
     return np.asarray(weights / max(float(weights.sum()), TINY))
 
@@ -346,7 +347,7 @@ class Cascade:
 
 
 def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:
-    """Return the results of a band at all pressures of its ladder, averaged over samples."""
+    """Return the results of a band at each mean pressure for which it is solved, averaged over samples."""
     each = zip(*(found[band, sample] for sample in samples), strict=True)
     return [_mean(rungs) for rungs in each]
 

@@ -260,7 +260,7 @@ class Cut:
         return math.sqrt(square + self.spectrum.moment(float(self.edges[int(of_map)]), float(self.edges[-1]), 0))
 
     def rms_slope(self, band: int, first: int | None = None) -> float:
-        """Return the rms slope of the waves of a band, or of all bands with the numbers from `first` to `band`."""
+        """Return the rms slope of all waves in a band, or in all bands with the numbers from `first` to `band`."""
         start = band if first is None else first
         of_map = self.measured is not None and start == 0
         square = self.measured.rms_slope**2 if self.measured and of_map else 0.0

@@ -103,7 +103,7 @@ def track_of(rows: Sequence[Rung]) -> Rung:
 
 
 def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
-    """Return the results of `track` interpolated between two places; friction is taken along `sign` times x."""
+    """Return the results of `track` interpolated between two instants; friction is taken along `sign` times x."""
 
     def between(values: Any) -> Any:
         return (1.0 - share) * values[before] + share * values[after]
@@ -230,12 +230,12 @@ class RoadHistory(RoadSliding):
         return [len(clock.places) for clock in self._clocks]
 
     def track(self, band: int, sample: int) -> list[Rung]:
-        """Return the track of a band at each pressure of its ladder."""
+        """Return the results over time (tracks) of a band, one for each mean pressure."""
         return self._tracks[band, sample]
 
     def plan(self) -> Iterator[str]:
-        """Yield lines on the bands, and on the number of marches and their time. The time of a step is measured in a
-        march of the finest band at the middle pressure of its ladder."""
+        """Yield lines on the bands, and on the number of marches and their time. The time of a step is measured in the
+        finest band at a mean pressure in the middle of its range."""
         yield from self.notes()
         tasks, steps, last = self.tasks(), self.steps(), self.cut.count - 1
         middle = len(self._hard.ladders[last].rungs) // 2

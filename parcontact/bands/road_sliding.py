@@ -94,14 +94,14 @@ class BandLoop(Protocol):
         """Prepare the iteration for a new steady state."""
 
     def act(self, road: "RoadSliding") -> None:
-        """Set what the effect changes in the bands of the next round."""
+        """Set what the effect changes in the bands before they are solved again."""
 
     def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
         """Return True if the next round would change nothing for the effect. `changes` are the relative changes of
         friction and area in the round; `others` is True if all loops that are earlier in the round settle."""
 
     def move(self, road: "RoadSliding", results: Results) -> None:
-        """Choose what the effect changes in the next round; raises RunError."""
+        """Choose what the effect changes before the bands are solved again; raises RunError."""
 
     def found(self, road: "RoadSliding", point: Point, results: Results, changes: tuple[float, float]) -> Point:
         """Return the point of a steady state with the results of the effect added."""
@@ -162,7 +162,7 @@ class RoadSliding:
         return self._cascade.store.keep_in(directory, self.job)
 
     def forget(self) -> None:
-        """Remove the stored contacts of the last point."""
+        """Remove the stored contacts of the last point, which is written."""
         self._cascade.store.clear()
 
     def set_temperature(self, temperature: float) -> None:
@@ -189,7 +189,7 @@ class RoadSliding:
         return point
 
     def rows(self, velocity: Vector) -> list[list[float]]:
-        """Return the lines of bands.csv for the last state."""
+        """Return the lines of bands.csv for the last steady state."""
         assert self._point is not None
         return self._rows(self._point, [self._point.speed])
 

@@ -75,8 +75,8 @@ def mark_working_set(p, u, h, d, lowest, highest, working):
 
 @loop
 def advance(p_old, t, step, lowest, highest, p):
-    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p, and the sum of the absolute changes of
-    p by these limits."""
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p, and the sum of the magnitudes by which
+    these limits have changed p."""
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0

@@ -76,7 +76,7 @@ class Box:
         return p if self.lowest == 0.0 else p > self.lowest
 
     def admits(self, mean: float) -> bool:
-        """Return True if pressures within the bounds can have this mean."""
+        """Return True if a prescribed mean pressure is possible: pressures within the bounds can have it."""
         return self.lowest * (1.0 - LOAD_ROUNDING) <= mean <= self.highest * (1.0 + LOAD_ROUNDING)
 
     def project(self, p: Array) -> None:

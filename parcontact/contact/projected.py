@@ -82,7 +82,7 @@ class Projected:
         return self._certify(h, mean, p)
 
     def forget(self) -> None:
-        """Discard the stored changes of earlier steps."""
+        """Put the stored changes of x in earlier steps to 0."""
         for field in (*self.t, *self.w):
             field.fill(0.0)
 

@@ -238,7 +238,7 @@ def page(name: str, writers: Writers | None = None) -> str:
 
 
 def plain_page(name: str, writers: Writers | None = None, width: int = 80) -> str:
-    """Return a page for a terminal `width` letters wide, without the marks of the web site."""
+    """Return a page for a terminal `width` letters wide, without the markup of the web site."""
     text = FENCE.sub("", written(page(name, writers)))
     text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
     text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)

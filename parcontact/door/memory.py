@@ -304,8 +304,8 @@ class Trial:
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
 
     def share(self, ranks: int) -> float:
-        """Return the ratio of the work of a rank, when `ranks` ranks share the grid of the job, to the work of a rank
-        in the trial."""
+        """Return how much work a rank has when `ranks` ranks share the grid of the job, divided by its work in the
+        trial."""
         return self.price * _work(*self.job.grid.points) / _work(*self.points) * self.ranks / ranks
 
     def step(self, ranks: int, overhead: float) -> float:

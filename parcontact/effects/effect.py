@@ -414,7 +414,7 @@ class Effect(Protocol[Memory]):
         return None  # type: ignore[return-value]
 
     def follow(self, instant: Instant, memory: Memory) -> Changes[Memory]:
-        """Return the changes that the effect makes after a step."""
+        """Return the effect's memory after a step, with what else the effect changes (`Changes`)."""
         return Changes(memory)
 
     def values(self, memory: Memory) -> Sequence[float]:

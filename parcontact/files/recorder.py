@@ -337,7 +337,7 @@ class Recorder:
 
     @property
     def table(self) -> TableMark:
-        """Return the state of measures.csv, on root."""
+        """Return the number of rows of measures.csv and the last row, for a checkpoint; on root."""
         return self._measures.table if self._measures else TableMark()
 
     def write(self, row: StepRow, field: Callable[[str], Array], total: int = 0) -> None:

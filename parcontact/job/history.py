@@ -157,8 +157,8 @@ class ChosenEnds:
 
 
 class MadeStep(NamedTuple):
-    """An accepted step whose length was chosen: number of the stage, end of the step [s after the start of the stage],
-    and length of the next step [s]."""
+    """An accepted step whose length was chosen: the number of the stage, the time at the end of the step [s since the
+    stage began], and the length of the next step [s]."""
 
     stage: int
     end: float

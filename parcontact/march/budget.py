@@ -143,7 +143,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors that the solve of a state of steady sliding causes. Friction is then a sum of squares."""
+    """Return the errors that an inexact solve of steady sliding causes. Friction is then a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
     friction = max(friction, SINGLE**2 / observed.body if observed.body else 0.0)
     return ErrorPair(friction, _solver_of_area(observed))
@@ -175,7 +175,7 @@ def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors that the mesh causes in a state of steady sliding."""
+    """Return the errors that the mesh causes in steady sliding."""
     correction = _grow_if_coherent(run, observed) * observed.correction * mean_over_spots(run, observed)
     lost = (IDENTICAL.value if run.identical_contacts else 1.0) * lost_at_edges(run, observed)
     friction = lost + STEADY_AREA.value * correction

@@ -104,7 +104,7 @@ def shortest_of(job: Job) -> float | None:
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """Return the largest numbers of waves in the box, along x and y, of those parts of the surface that are sums of
+    """Return how many waves fit into the box along x and y, at most, in those parts of the surface that are sums of
     waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:

@@ -168,7 +168,7 @@ class Scene:
 
     @cached_property
     def controller(self) -> Controller:
-        """Controller of the tolerance of solves and of the length of steps."""
+        """Controller, which chooses the tolerance of each solve and the length of each step."""
         choices = self.choices
         energies, exact = self.energy is not None, bool(choices.forbidden(TOLERANCES))
         return Controller(self.job, choices.timeline, self.material, energies, exact)

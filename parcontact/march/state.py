@@ -410,8 +410,8 @@ class _ChosenStepsPart:
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step. `body` is the memory of the body, if it exists already. All other maps of
-    the state are new."""
+    """Return the state of a run before the first step. `body` is the memory of the body, if it exists already. All
+    other maps of the state are new."""
     parts = parts_of(scene)
     given = {} if body is None else {"material": body}
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
@@ -485,7 +485,8 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
 
 
 def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
-    """Write a checkpoint of a state, with the plans of the run's transforms; collective. Raises RunError."""
+    """Write a checkpoint of a state, with the algorithms that FFTW has chosen for transforms; collective. Raises
+    RunError."""
     everything = {**entries(scene, state), "plans/all": Entry(wisdom.gather(scene.slab))}
     checkpoint.write_checkpoint(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)
 

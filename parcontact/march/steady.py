@@ -288,7 +288,7 @@ class SteadySliding:
         return []
 
     def keep_in(self, directory: Path) -> str:
-        """Do nothing: a point is one solve, without intermediate results."""
+        """Keep nothing for a continuation: a point is one solve, without intermediate results."""
         return ""
 
     def forget(self) -> None:

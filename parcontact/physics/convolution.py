@@ -150,7 +150,7 @@ def _in_blocks(
 
 
 def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Return the angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to the
+    """Return the angular wavenumbers `(qx, qy)` of a spectrum on a box of `size = (lx, ly)`; they broadcast to the
     shape of its `rows`."""
     along_x, along_y = fft.modes
     return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y[rows]

@@ -214,7 +214,7 @@ class AppliedInverse:
         return self._inverse.apply(du, self._scratch()), None
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
-        """Return no entry."""
+        """Return no entry of a checkpoint: there is no memory."""
         return {}
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> None:

@@ -519,7 +519,7 @@ class HalfSpace:
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
-        """Return a function of rows of the spectrum, which returns the modulus G*(-q v) of each wave of these rows,
+        """Return a function that takes rows of the spectrum and returns, for each wave there, the modulus G*(-q v)
         times the `factors`. At a Nyquist wavenumber, which has two signs, the modulus is the mean for both signs.
 
         The moduli broadcast to the rows: without factors, and under a surface that slides along x, all rows are equal

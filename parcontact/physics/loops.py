@@ -283,9 +283,9 @@ def displace(h, rows, along_x, along_y, out):
 
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
-    """Advance all waves of heat by a step dt, put the spectrum of the temperature of the surface into `out`, which may
-    be one of the `sources`, and store the sources at the end of the step. Return the sum over all waves but the mean of
-    the temperature at depth times the pressure at the end of the step (`effects.heat.solver`).
+    """Advance all waves of heat by a step dt, and store the sources at the end of the step. Put the spectrum of the
+    surface temperature into `out`, which may be one of the `sources`. Return the sum over all waves but the mean of the
+    temperature at depth times the pressure at the end of the step (`effects.heat.solver`).
 
     * waves: spectra of the waves along the depth that have a memory, shape (kept, rows, columns);
     * known: the rates, weights and shares of heat at depth of all waves along the depth; the decays over the step of

@@ -193,7 +193,7 @@ class Results:
 
     @property
     def sentences_of_study(self) -> list[str]:
-        """Sentences on a study; empty before it is finished."""
+        """Sentences on the results of `parcontact study`; empty before the study is finished."""
         if not self.has(outputs.STUDY_TEXT):
             return []
         tables.refuse_cut(self.path / outputs.STUDY_TEXT)

@@ -1,4 +1,4 @@
-"""Results of the slide of a run, and of the cycles of its stages that oscillate, from the rows of measures.csv.
+"""Results of the slide and of the oscillation cycles of a run, from the rows of measures.csv.
 
 The slide of a history is its last part at one non-zero velocity under one load. It consists of the last stage that
 slides, and of the stages just before it with the same velocity and the same constant load. As in the paper (Sec. 3.1),

@@ -103,7 +103,7 @@ def plain(text: str, most: int = 1000) -> str:
 
 
 def colors(count: int) -> list[str]:
-    """Return `count` different colours of lines. If there are more lines than colours for colour-blind readers, the
+    """Return `count` different colours for curves. If there are more curves than colours for colour-blind readers, the
     colours go from dark to light."""
     return list(COLORS[:count]) if count <= len(COLORS) else sequence(count)
 

@@ -266,9 +266,10 @@ def curvature(law, g, q, mean, sigma, way, image):
 def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
     """Put `g + step way`, at least 0, into the map `g_new`, and the attraction at this gap into `sigma_new`.
 
-    Return the change of the energy, which is the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d
-    = g_new - g`, and the sum of the magnitudes of both parts. For small d the change of gamma is computed as d times
-    the mean attraction, which has a smaller rounding error."""
+    Return by how much the energy changes, which is the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)`
+    with `d = g_new - g`. Also return the sum of the magnitudes of both parts. For small d the change of gamma is
+    computed as d times the mean attraction, which has a smaller rounding error.
+    """
     total, size = 0.0, 0.0
     for j in range(g.shape[0]):
         row_total, row_size = 0.0, 0.0

@@ -265,7 +265,8 @@ class MeanMemory:
 
 
 class HeatMemory:
-    """The waves of temperature (4) below a box of `size` [m], and the spectra of the heat at the end of the last step.
+    """The temperature waves (4) in the body below a box of `size` [m], and the spectra of heat at the end of the last
+    step.
 
     `fft` is a transform of the size of maps, `body` the conductor, and `known` the sum of exponentials. `rubs` is True
     if heat is also released on the surface, and not only in the body. The constructor and the methods are collective.

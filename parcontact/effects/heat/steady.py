@@ -65,8 +65,8 @@ def find_temperatures(
     friction: float,
     velocity: Vector,
 ) -> tuple[Flash, Array]:
-    """Return the temperatures of a steady state, and this rank's rows of the map of temperature rises of the surface
-    [K]; collective.
+    """Return the temperatures of a steady state, and this rank's rows of a map [K]: how much warmer the surface is at
+    each point. Collective.
 
     `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `velocity` is in m/s.
     `friction` is the coefficient of friction of the body, without the interface.
@@ -187,13 +187,13 @@ def loops(setup: Setup) -> Iterator[HeatLoop]:
 
 
 def no_material(speed: float, pressure: float, temperature: float, error: InputError) -> UnsolvedError:
-    """Return the error of a state whose flash temperature is outside the known range of the material."""
+    """Return the error for a steady state whose flash temperature is outside the known range of the material."""
     place = describe_cold_state(speed, pressure, temperature)
     return UnsolvedError(place, f"no material at the flash temperature: {error}")
 
 
 def describe_cold_state(speed: float, pressure: float, temperature: float) -> str:
-    """Return a text that names a state: velocity [m/s], pressure [Pa] and temperature of the cold body [deg C]."""
+    """Return a text that names a steady state by velocity [m/s], pressure [Pa] and cold temperature [deg C]."""
     return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
 
 

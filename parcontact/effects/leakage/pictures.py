@@ -66,8 +66,8 @@ LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
 def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
-    """Yield the panel of a run's conductivities if the gap is open at any time, and the panel of the leak against the
-    pressure of a fluid that carries a part of the load."""
+    """Yield the panel of a run's conductivities if the gap is open at any time. If the fluid carries a part of the
+    load, also yield the panel of the leak against the fluid pressure."""
     columns = run.columns
     names = {name: label for name, label in FLOWS.items() if name in columns}
     if names and max(np.nanmax(columns[name], initial=0.0) for name in names) > 0.0:

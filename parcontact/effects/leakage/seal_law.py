@@ -387,7 +387,7 @@ class SealLaw:
         return with_whole_maps(self.slab, act, gap, share)
 
     def motion(self, solved: SolvedContact[SealMemory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return no motion: the motion of edges in a step is not limited."""
+        """Return no motion: this law does not limit the motion of edges of contact in a step."""
         return EdgeMotion()
 
     # -- as a part of the run ------------------------------------------------------------------------------------------

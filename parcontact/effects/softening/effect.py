@@ -61,7 +61,7 @@ class StrainTable:
         return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:
-        """Return True if a strain is within the range of the table."""
+        """Return True if a strain is within the range of the table, so that its factors are known."""
         return self.strain[0] <= strain <= self.strain[-1]
 
 

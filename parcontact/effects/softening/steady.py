@@ -310,8 +310,8 @@ def describe_bands(job: Any, cut: Any) -> Iterator[str]:
 
 
 class StrainProbe:
-    """Measures in the contacts of a band the mean square strain S(z) at all depths, and the weights of S(z) in the
-    square of the strain of this band."""
+    """Measures the mean square strain S(z) at all depths in the contacts of a band, and the weights with which S(z)
+    gives the square of the band's strain."""
 
     means: ClassVar[Means] = {"squares": by_power, "strain_weights": by_power}
 

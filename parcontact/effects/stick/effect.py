@@ -145,8 +145,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
 
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
-        """Solve for the tractions of a step, in the maps of `memory`, and return the changes that follow from these
-        tractions; collective."""
+        """Solve for the tractions of a step, in the maps of `memory`. Return the new memory, with what else the step
+        changes (`Changes`). Collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
         (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
         way = along * x - across * y, along * y + across * x

@@ -308,8 +308,8 @@ def components(field: Array) -> tuple[Array, Array]:
 
 
 class ShearOperator:
-    """Operator from tractions to displacements along the surface of a half space of shear modulus 1, which is loaded
-    inside a box of a `size` in any unit of length.
+    """Operator from tractions to displacements, both along the surface of a half space of shear modulus 1. Tractions
+    lie in a box of this `size`, in any unit of length.
 
     The box is periodic unless it is `free`. `short` is the displacement of the shortest waves of the grid under a
     traction of 1 across their direction. The constructor and `apply` are collective.
