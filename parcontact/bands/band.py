@@ -63,9 +63,9 @@ class PressureLadder:
 
     @classmethod
     def over(cls, mean: float, rms: float) -> PressureLadder:
-        """Return the ladder of a band, for the mean pressure and the rms deviation [Pa] that coarser bands give in full
-        contact. The rungs are equally spaced in the logarithm, up to the mean pressure and `ABOVE` deviations.
-        Without a deviation the mean pressure is the only rung."""
+        """Return the pressures (rungs) at which a band is solved, for the mean pressure and the rms deviation [Pa] that
+        coarser bands give in full contact. They are equally spaced in the logarithm, up to the mean pressure and
+        `ABOVE` deviations. Without a deviation the mean pressure is the only rung."""
         if not rms > 0.0:
             return cls(np.array([mean]))
         top = mean + ABOVE * rms
@@ -99,8 +99,8 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Rung:
-    """Results of one band under a mean `pressure` [Pa] of its ladder: a steady state, or a track over time, whose
-    numbers are arrays (`road_history.track_of`).
+    """Results of one band under one mean `pressure` [Pa]: of a steady state, or of a history. Then the numbers are
+    arrays over its instants, a track (`road_history.track_of`).
 
     `friction` [-] of the band's waves follows from the dissipated power, and `friction_slopes` from the pressures on
     slopes. Contact areas are shares of the nominal area. `Cascade.climb` adds the approach of finer bands to the
@@ -217,9 +217,9 @@ class Band:
         return contact
 
     def solve(self, pressure: float, law: Constraint, below: PressureLadder | None) -> Rung:
-        """Return the steady state under a mean pressure [Pa], with the distribution of the contact's pressures over
-        `below`, the ladder of the next finer band. `law` states by which length [m] a pressure [Pa] closes the gap that
-        all finer bands leave. Raises RunError if no state is found."""
+        """Return the steady state under a mean pressure [Pa]. It includes how the pressures of the contact load the
+        rungs `below`, which are the mean pressures at which the next finer band is solved. `law` states by which length
+        [m] a pressure [Pa] closes the gap that all finer bands leave. Raises RunError if no state is found."""
         setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
         units = setup.units
         seen = contact.u, self.heights, contact.d, law.touches(contact.p)

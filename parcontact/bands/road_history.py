@@ -49,7 +49,8 @@ class BandMarch:
     """Marches of one band: calculations step by step through the history of the band.
 
     Each march is under a constant mean pressure. Its result is a track: a `Rung` whose numbers are arrays with a first
-    axis over `BandClock.places`. The friction of a track is along +x, from the pressures on slopes."""
+    axis over the instants `BandClock.places`. The friction of a track is along +x, from the pressures on slopes.
+    """
 
     def __init__(self, band: Band) -> None:
         self.band = band
@@ -59,9 +60,9 @@ class BandMarch:
     def march(
         self, pressure: float, law: LawAt | None, place: Callable[[Step], Place], below: PressureLadder | None
     ) -> Rung:
-        """Return the results at all places of the history under a mean pressure [Pa], with the distribution of pressure
-        over `below`, the ladder of the next finer band. Without a `law` finer bands are absent. Raises RunError if a
-        step fails."""
+        """Return the results at all instants of the history under a mean pressure [Pa]. They include how the pressures
+        of the contact load the rungs `below`, the mean pressures at which the next finer band is solved. Without a
+        `law` finer bands are absent. Raises RunError if a step fails."""
         scene, rows = self.scene, list[Rung]()
         scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
         march = self._begin(pressure, law)
@@ -123,8 +124,7 @@ EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decide
 
 class RungTask(NamedTuple):
     """One march (a simulation over time) to make: of one `band`, in one `sample` of the surface, under the load with
-    the number `rung`. Numbers begin with 0. A `hard` march leaves out that roughness of finer bands is squeezed under
-    pressure."""
+    the number `rung`. Numbers begin with 0. In a `hard` march finer roughness is not squeezed under pressure."""
 
     band: int
     sample: int

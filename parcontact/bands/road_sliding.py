@@ -97,8 +97,8 @@ class BandLoop(Protocol):
         """Set what the effect changes in the bands before they are solved again."""
 
     def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the next round would change nothing for the effect. `changes` are the relative changes of
-        friction and area in the round; `others` is True if all loops that are earlier in the round settle."""
+        """Return True if the next round (solve of all bands) would change nothing for the effect. `changes` are the
+        relative changes of friction and area in this round; `others` is True if all loops before this one settle."""
 
     def move(self, road: "RoadSliding", results: Results) -> None:
         """Choose what the effect changes before the bands are solved again; raises RunError."""

@@ -219,7 +219,7 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
-    """Return s and s m, the shares of the loss in the module's docstring, for round spots of contact that slide.
+    """Return s and s m of the module: the shares of the loss in waves shorter than cells, for round spots of contact.
 
     `radius` is the radius of the spots in cells, and `speed` the number of cells that they slide per second. If
     `edges_follow_grid`, the spots are strips, and `radius` is their half width. Both results are at most 1. Both are 0

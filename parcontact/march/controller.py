@@ -279,8 +279,8 @@ class Controller:
         return min(most, FIRST) if (step.growth == 0.0 or ends) and self.relaxes else most
 
     def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
-        """Return the memory of the tolerance after a step. `certificate` is the error that the solve of the step has
-        reached, and `budget` is the error budget of the step."""
+        """Return, after a step, the memory from which the next tolerance follows. `certificate` is the error that the
+        solve of the step has reached, and `budget` is the error budget of the step."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
         room = _room(budget.area, OF_SOLVER_IN_AREA, self.asked.area)

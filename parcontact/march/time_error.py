@@ -157,7 +157,7 @@ class RunProperties:
 class StepObservation:
     """Numbers of a step, or of a steady state, from which errors are estimated.
 
-    * `complementarity`: the error of this name in the certificate of the solve (`physics.records.Certificate`);
+    * `complementarity`: the error of the solve with this name (`physics.records.Certificate`);
     * `friction`, `interface`: the friction coefficient, and the part of it that the interface causes;
     * `area`, `corrected`: the counted and the corrected contact area, as shares of the box;
     * `slope`: rms slope of the surface, weighted by the pressure;

@@ -373,7 +373,7 @@ class HeatOfBands:
 
     With feedback each band relaxes at its own temperature. The temperatures change the friction and so the heat of the
     bands, which gives new temperatures. Aitken's relaxation finds the temperatures that do not change any more. The
-    first round is for cold rubber. No temperature above the range of the material's shift is tried.
+    first iteration is for cold rubber. No temperature above the range of the material's shift is tried.
     """
 
     words: ClassVar[tuple[str, str]] = ("temperatures", "feedback: none")

@@ -129,11 +129,10 @@ class Rounds:
         self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[Verdict, Map]:
-        """Make a round: find the flow through a gap. The map `gap` [m] is the gap of the contact under the pressure of
-        the fluid that belongs to the map `share` of s.
+        """Make one iteration (round): find the flow through a gap. The map `gap` [m] is the gap of the contact under
+        the pressure of the fluid that belongs to the map `share` of s.
 
-        Return the verdict on the round, and the map of s for the next round, whose mean pressure is at most `most`
-        [Pa].
+        Return the verdict on the round, and the map of s for the next one, whose mean pressure is at most `most` [Pa].
         """
         if self.count and self.count % EACH == 0:
             self._restart()
