@@ -101,7 +101,8 @@ class Dialect:
 
 
 def find_dialect(path: Path, rows: Sequence[str]) -> Dialect:
-    """Return the dialect of a file from some of its rows of numbers. Raises InputError if commas are ambiguous."""
+    """Return the form of the rows of a file (`Dialect`), found from some of its rows of numbers. Raises InputError if
+    commas are ambiguous."""
     mark = next((mark for mark in MARKS if 2 * sum(mark in row for row in rows) >= len(rows)), None)
     if mark == "," and all(_has_decimal_commas(row) for row in rows):
         mark = None

@@ -116,8 +116,8 @@ def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """Which branches of a material have a map: `kept` has the numbers of branches with a map, `memoryless` and `frozen`
-    the numbers of branches without one.
+    """Division of a material's branches. `kept` has the numbers of branches whose stress is stored as a map.
+    `memoryless` and `frozen` have the numbers of branches without a map.
 
     All branches without a map together cause a relative error of at most `bound`, which is at most `allowed`. This is
     an error of friction if the surface slides, else an error of the modulus. `memoryless_errors` are the errors that
@@ -184,8 +184,8 @@ def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
 
 
 def bounded_error(found: FoldedBranches, slides: bool) -> str:
-    """Return a text with the bound on the error that branches without a map cause; the text states at least
-    LEAST_BOUND."""
+    """Return the bound on the error that branches without a map cause, as text; smaller bounds than LEAST_BOUND are
+    stated as LEAST_BOUND."""
     what = "friction" if slides else "the modulus"
     return f"error of {what} at most {per_cent(max(found.bound, LEAST_BOUND))}"
 

@@ -213,8 +213,8 @@ class StepObservation:
 
 def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
     """Return the properties of a run of a job. `shortest` is the shortest wave [m] of a measured map, or None. `folded`
-    is the bound on the error of folded branches. `prony` is the relaxation function of the body, None for an elastic
-    body."""
+    is the bound on the error that branches without a map cause. `prony` is the relaxation function of the body, None
+    for an elastic body."""
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [shortest] if shortest is not None else []
     (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
