@@ -34,7 +34,7 @@ def test_kinds_have_names_of_their_own_and_are_called() -> None:
 
 def test_numbers_in_sentences() -> None:
     """Shares in per cent, lengths with units, and how many times, also beyond all numbers."""
-    contact = {"where": "step 3", "excess": 0.2031, "most": 0.15, "more": "128 points"}
+    contact = {"where": "step 3", "excess": 0.2031, "most": 0.15, "finer": "128 points"}
     assert "about 20 % too large (limit: 15 %" in str(WARN_CELLS("", contact))
     text = str(WARN_FLAT_MAP("surface", {"file": "a.npy", "lx": 1.23456e-3, "ly": 0.5, "span": 2.3456e-6}))
     assert text.startswith("surface: a.npy: the map is 1.235 mm x 500 mm, and its heights differ by 2.35 µm only")

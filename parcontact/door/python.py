@@ -259,7 +259,7 @@ def steady(
     for doubt in sliding.doubts(wanted.temperatures):
         if slab.root:
             warn(doubt)
-    contacts = curve.watch_contacts(sliding.setup)
+    contacts = curve.watch_contacts(sliding.setup, found)
     points: list[Point | None] = []
     failures: list[str] = []
     doubts: list[Doubt] = []

@@ -21,7 +21,7 @@ from ..files.recorder import Console
 from ..files.stopping import Options, Watch, always, watching
 from ..files.tables import GrowingTable, LostPoint, Wanted
 from ..job import Job, listing
-from ..job.advice import describe_sample, more_points
+from ..job.advice import describe_sample
 from ..job.history import Timeline
 from ..job.listing import answers
 from ..job.materials import describe_temperature
@@ -29,7 +29,7 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..printed import per_cent
 from . import choices, sanity, scene
-from .budget import advice, describe, exceeds
+from .budget import MESH_OF_BANDS, advice, describe, exceeds
 from .scene import Setup
 from .steady import Point, SteadySliding
 
@@ -336,10 +336,12 @@ def on_one_grid(job: Job, slab: Slab) -> States:
     return SteadySliding(scene.set_up(job, slab))
 
 
-def watch_contacts(setup: Setup) -> sanity.ContactWatch:
-    """Return the checks of the contacts of a curve. Each kind of warning is given once for the whole curve."""
+def watch_contacts(setup: Setup, job: Job) -> sanity.ContactWatch:
+    """Return the checks of the contacts of a curve of `job`; `setup` is that of its grid or its coarsest band. Each
+    kind of warning is given once for the whole curve."""
     chosen = setup.choices
-    return sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
+    finer = MESH_OF_BANDS if job.bands is not None else sanity.finer_cells(chosen.grid)
+    return sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, finer)
 
 
 def solve_point(sliding: States, wanted: Request, at: Wanted) -> Point:
@@ -395,7 +397,8 @@ def run_curve(
             table.say(renewed)
         try:
             with watching(directory, job.checkpoint, options) as watch:
-                return _Curve(sliding, wanted, table, maps, directory, watch, options.shows).go(draw)
+                contacts = watch_contacts(sliding.setup, job)
+                return _Curve(sliding, wanted, table, maps, directory, watch, contacts, options.shows).go(draw)
         finally:
             if table:
                 table.close()
@@ -440,11 +443,12 @@ class _Curve:
     maps: SteadyMaps | None
     directory: Directory
     watch: Watch
+    contacts: sanity.ContactWatch
     shows: Callable[[Doubt], bool]
     failures: int = 0
 
     def __post_init__(self) -> None:
-        self.slab, self.contacts = self.sliding.setup.slab, watch_contacts(self.sliding.setup)
+        self.slab = self.sliding.setup.slab
 
     def go(self, draw: Draw | None) -> int:
         """Solve the missing points of the curve; collective. Return the exit code."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..effects.branches import time_factor_of
 from ..errors import Doubt, InputError, JobError, Kind, RunError
-from ..job import Job, OnOneMesh, Output, Zener, advice, limits, meaning
+from ..job import Grid, Job, OnOneMesh, Output, Zener, advice, limits, meaning
 from ..job.advice import more_points
 from ..job.history import Timeline
 from ..job.limits import MOST_STEPS
@@ -238,14 +238,14 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 class ContactWatch:
     """Checks the contact of each step, and gives each kind of warning once.
 
-    If `strict` is True, warnings are errors. `more` is the remedy in a warning about few cells. `further` are the
-    checks of effects: functions of the measures and a place. `mesh` states the points of the grid.
+    If `strict` is True, warnings are errors. `finer` is the advice on a finer mesh in a warning about few cells.
+    `further` are the checks of effects: functions of the measures and a place. `mesh` states the points of the grid.
     """
 
     strict: bool
     timeline: Timeline
+    finer: str
     seen: set[str] = field(default_factory=set)
-    more: str = "more grid.points"
     further: Sequence[Callable[[Measures, str], Iterator[Doubt]]] = ()
     mesh: RunProperties = field(default_factory=lambda: RunProperties(1))
 
@@ -254,7 +254,7 @@ class ContactWatch:
         """Return the checks of contacts for a job."""
         further = [partial(asked, job) for asked in job.asked("doubt_contact")]
         mesh = properties_of(job, None)
-        return cls(job.numerics.strict, timeline, more=more_points(job.grid), further=further, mesh=mesh)
+        return cls(job.numerics.strict, timeline, finer_cells(job.grid), further=further, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return the new warnings about the contact of a step. Raises RunError if there are any and `numerics.strict`
@@ -267,13 +267,18 @@ class ContactWatch:
         or of a solve, is checked for too few cells. Raises RunError if there are warnings and `numerics.strict` is
         set."""
         found = [WARN_EDGE("", {"where": where})] if measures.at_edge else []
-        found += doubt_cells(measures, self.mesh, where, self.more) if final else ()
+        found += doubt_cells(measures, self.mesh, where, self.finer) if final else ()
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
         if new and self.strict:
             raise RunError("; ".join(f"{doubt} ({STRICT})" for doubt in new))
         return new
+
+
+def finer_cells(grid: Grid) -> str:
+    """Return the advice to use smaller cells on a grid."""
+    return f"{more_points(grid)}, a smaller grid.size"
 
 
 WARN_EDGE = Kind(
@@ -286,25 +291,25 @@ WARN_EDGE = Kind(
 WARN_BELOW_A_CELL = Kind(
     "below a cell",
     "{where}: spots of contact may be smaller than a cell, so that their area and friction are not known and no "
-    "error is stated; use {more}, a smaller grid.size or a larger load",
+    "error is stated; use {finer} or a larger load",
 )
 WARN_CELLS = Kind(
     "cells",
     "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
-    "{most!p}); use {more}, a smaller grid.size or a larger load",
+    "{most!p}); use {finer} or a larger load",
 )
 
 
-def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a warning if spots of contact are only a few cells wide, or smaller than a cell. `more` states the
-    remedy."""
+def doubt_cells(measures: Measures, mesh: RunProperties, where: str, finer: str) -> Iterator[Doubt]:
+    """Yield a warning if spots of contact are only a few cells wide, or smaller than a cell. `finer` is the advice on a
+    finer mesh."""
     area, corrected = measures.contact_area, measures.contact_area_corrected
     if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
-        yield WARN_BELOW_A_CELL("", {"where": where, "more": more})
+        yield WARN_BELOW_A_CELL("", {"where": where, "finer": finer})
         return
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess > FEW_CELLS:
-        yield WARN_CELLS("", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})
+        yield WARN_CELLS("", {"where": where, "excess": excess, "most": FEW_CELLS, "finer": finer})
 
 
 # -- measured frequencies and temperatures ----------------------------------------------------------------------------

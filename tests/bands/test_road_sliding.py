@@ -17,11 +17,13 @@ from parcontact.bands.road_sliding import LEAST_METHOD, LEAST_OF_AREA, RoadSlidi
 from parcontact.effects.branches import relaxation_of
 from parcontact.errors import JobError, RunError
 from parcontact.files import tables
+from parcontact.march import curve
 from parcontact.march.budget import ErrorParts, advice
 from parcontact.march.scene import set_up
 from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.prony import complex_modulus
+from parcontact.physics.records import Measures
 
 LONG, SHORT = 4e-3, 5e-4
 ROUGH = {
@@ -390,6 +392,14 @@ def test_errors_of_the_area_by_the_grids_of_all_bands_add_up() -> None:
     grids = [result.errors[5] / result.contact_area_corrected for result in found._results]
     assert min(grids) > 0.001
     assert point.errors.area.mesh == pytest.approx(sum(grids), rel=1e-12)
+
+
+def test_advice_on_small_spots_names_the_mesh_of_bands() -> None:
+    """A job with bands has neither grid.points nor grid.size."""
+    road = sliding({})
+    measures = Measures(contact_area=0.1, contact_area_corrected=0.08)
+    (doubt,) = curve.watch_contacts(road.setup, road.job).check_point(measures, "here")
+    assert str(doubt).endswith("use more points in each band (bands.points) or a larger load")
 
 
 def test_advice_on_the_coupling_of_bands_states_what_fewer_bands_leave() -> None:

@@ -45,7 +45,7 @@ history: [{force: 4.0e-2, duration: 0.1}, {force: {mean: 4.0e-2, amplitude: 4.0e
 sweep: [{history.1.force.frequency: [2.0, 8.0]}]
 numerics: {accuracy: 0.2}
 """
-CELLS = {"excess": 0.2, "most": 0.15, "more": "more points"}  # of a doubt about contacts of few cells
+CELLS = {"excess": 0.2, "most": 0.15, "finer": "more points"}  # of a doubt about contacts of few cells
 
 
 @pytest.fixture
