@@ -132,7 +132,8 @@ class RoadSliding:
         self._results: Results = ()
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
-        """Return warnings about the job, also at these temperatures [deg C]."""
+        """Return warnings about the job, and about frequencies at which the material was not measured at these
+        temperatures [deg C]."""
         return doubts_of_bands(self.job, self.cut, temperatures)
 
     def notes(self) -> list[str]:

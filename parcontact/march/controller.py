@@ -75,7 +75,7 @@ MISSED = 0.5  # accuracy: relative error of the load of a sample above which all
 
 @dataclass(frozen=True)
 class IntegratorDifference:
-    """Result of the embedded pair for one step. All rms values are weighted by the pressure.
+    """Difference of two integrators over one step (the embedded pair). All rms values are weighted by the pressure.
 
     `difference` is the relative difference of both integrators, which grows with the step length to the power `order`.
     `slope` is the rms slope of the surface along x, in the run's unit of height per unit of length. `angle` is the rms

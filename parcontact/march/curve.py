@@ -369,7 +369,7 @@ def run_curve(
     the exit code.
 
     If a point fails, the others are still solved, and the exit code is 1. The option `restart` is `auto` or `never`.
-    `make` returns the solver of the states. `draw` draws the finished curve, on root.
+    `make` returns the solver of the steady states. `draw` draws the finished curve, on root.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():

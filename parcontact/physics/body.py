@@ -62,12 +62,12 @@ class BodyMemory:
     """Memory of a body between two steps, on the rows of this rank: the displacement u of its surface, the `increment`
     of u in the last step, and the branch maps.
 
-    `displacement` is None if it must be computed from the pressure. `pending` holds the coefficients of the advance of
-    the branch maps over the last step. The next `begin` makes this advance, from the increments of u in the last step
-    and in the step before (map `before`), and then overwrites the map `before` by the effective heights. If this next
-    step is dropped, another step may begin from the same memory. The memories at the start and at the end of a step
-    share all maps but the displacement: once a step has begun from the memory at the end, the memory at the start is
-    invalid.
+    `displacement` is None if it must be computed from the pressure. `pending` holds the coefficients by which the
+    branch maps advance over the last step. The next `begin` makes this advance, from the increments of u in the last
+    step and in the step before (map `before`), and then overwrites the map `before` by the effective heights. If this
+    next step is dropped, another step may begin from the same memory. The memories at the start and at the end of a
+    step share all maps but the displacement: once a step has begun from the memory at the end, the memory at the start
+    is invalid.
     """
 
     displacement: Array | None

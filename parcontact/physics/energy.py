@@ -76,9 +76,8 @@ class EnergyMemory:
     elastic: BodyMemory | None = None
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
-        """Return the energies after a step without external work, which began at the memory `before`. The stored energy
-        that is lost in the step is distributed to the branches in proportion to the energy that each has dissipated in
-        the step."""
+        """Return the energies after a step that began with the memory `before` and had no external work. The stored
+        energy that is lost in the step is shared among the branches in proportion to their dissipation."""
         lost = self.dissipated - before.dissipated
         whole = float(lost.sum())
         share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
@@ -116,7 +115,7 @@ class StepProducts(NamedTuple):
 
 
 def dissipation_weights(z: Array) -> StepProducts:
-    """Return the weights of `StepProducts` in the energy that a branch dissipates in a step, which is the integral of
+    """Return the weights with which `StepProducts` give the energy that a branch dissipates in a step: the integral of
     `<h, A^-1 h>/(G tau)` over the step. `z = dt/tau` has any shape, and the weights have the same shape."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)

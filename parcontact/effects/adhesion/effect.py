@@ -492,9 +492,9 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return AdhesionMemory()
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
-        """Return the changes after a step: the energies and the columns. No errors are stated across a snap. A remark
-        warns once if edges of contact of a viscoelastic body move so far in a step that the rates of strain are not
-        resolved."""
+        """Return what a step changes: the energies and the columns. No errors are stated across a snap. A remark warns
+        once if edges of contact of a viscoelastic body move so far in a step that the rates of strain are not resolved.
+        """
         solved, energies = instant.solved, memory.energies
         force = force_of_pressures(instant.measures, instant.step.velocity)
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan

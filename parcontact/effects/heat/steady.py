@@ -281,9 +281,9 @@ def uniform(body: Conductor, m: Array, time: float) -> Array:
 
 
 def warming_factors(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Array:
-    """Return the factors of S_j(m) for all waves of a band j that has slid at `velocity` [m/s] for a `time` [s], shape
-    (m, waves). A half spectrum lacks waves: each factor is multiplied by the number of waves that its wave represents.
-    """
+    """Return the factors of the waves of a band j in the sum S_j(m) of the module, shape (m, waves). The band has slid
+    at `velocity` [m/s] for a `time` [s]. A half spectrum lacks waves: each factor is multiplied by the number of waves
+    that its wave represents."""
     fft, size = setup.fft, setup.grid.size
     square = body.squared_beta(fft, size, velocity)
     counts = (fft.multiplicity * (square.real > 0.0)).ravel()

@@ -122,7 +122,8 @@ class Interface(Part):
     rules = rules_of(_needs_its_folder, _bell)
 
     def friction(self, material: Any) -> InterfaceFriction | None:
-        """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
+        """Return the law of the shear stress, shifted to the temperature of a material; None if a coefficient is given
+        instead."""
         if self.shear_stress is None:
             return None
         return InterfaceFriction(self.shear_stress, self.velocity, self.width or 1.0, time_factor_of(material))
