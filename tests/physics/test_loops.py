@@ -39,8 +39,8 @@ def test_begin(count: int) -> None:
     decay, gain, back, weight = random.normal(size=(4, count, 1, 1))
     advanced = decay * branches + gain * du + back * buffer
     expected = roll(heights, 3) + (weight * advanced).sum(axis=0) - 0.3 * u + 0.7 * du
-    coefficients = (each[:, 0, 0].copy() for each in (decay, gain, back))
-    loops.begin(branches, *coefficients, du, buffer, weight[:, 0, 0].copy(), 0.3, 0.7, u, heights, 3)
+    a, b, c, w = (each[:, 0, 0].copy() for each in (decay, gain, back, weight))
+    loops.begin(branches, a, b, c, du, buffer, w, 0.3, 0.7, u, heights, 3)
     assert_allclose(branches, advanced, atol=1e-14)
     assert_allclose(buffer, expected, atol=1e-14)
 
