@@ -117,8 +117,8 @@ class SweepWarnings:
         return new and self._at_once
 
     def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
-        """Return the messages at the end: warnings that were not yet shown, or that several cases have. `of_groups` has
-        the attribute `kinds` of each group of ranks."""
+        """Return the messages at the end: warnings that were not yet shown, or that several cases share. `of_groups` is
+        a list of the `kinds` of all groups of ranks."""
         whole: Kinds = {}
         for kinds in of_groups:
             for subject, (doubt, cases) in kinds.items():

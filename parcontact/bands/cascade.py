@@ -187,8 +187,8 @@ Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
 class Cascade:
     """All bands of a job. Methods are collective.
 
-    The ranks of `slab` share the contacts. The grid of `slab` is not used. Contacts in the `store` are not solved
-    again.
+    The contacts are distributed over the ranks of `slab`, whose grid is not used. Contacts in the `store` are not
+    solved again.
     """
 
     def __init__(self, job: Job, cut: Cut, slab: Slab) -> None:

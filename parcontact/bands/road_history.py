@@ -143,9 +143,9 @@ class Instant(NamedTuple):
 
 
 class ClosingOverTime:
-    """Law at each instant by which a pressure squeezes a band and all finer bands: the mean planes approach. It follows
-    from the band's `approaches` [m], shape (mean pressures, instants of `clock`), and from the law of the `finer`
-    bands."""
+    """Law that gives, at each instant, how much a pressure brings the mean planes closer together by squeezing a band
+    and all finer bands. The law follows from the band's `approaches` [m], shape (mean pressures, instants of `clock`),
+    and from the law of the `finer` bands."""
 
     def __init__(
         self, cascade: Cascade, number: int, clock: BandClock, approaches: Array, finer: "ClosingOverTime | None"

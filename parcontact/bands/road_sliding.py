@@ -256,7 +256,8 @@ class RoadSliding:
         return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
     def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
-        """Set the factors by which the moduli are multiplied for each wave of a band: `at(values[band])`."""
+        """Multiply the moduli by factors. For each wave of a band, `at` returns the factors for the band's entry in
+        `values`."""
         self._cascade.set_factors(at, values)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:

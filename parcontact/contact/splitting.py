@@ -1,4 +1,4 @@
-"""Steady contact by accelerated splitting: a law of the interface, or an operator that is not symmetric.
+"""Steady contact with a law of the interface or an operator that is not symmetric, by accelerated splitting.
 
 Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`problem.InterfaceLaw`). A is
 diagonal in Fourier space and c in real space, so that `1 + gamma A` and `1 + gamma c` are each inverted exactly. J_c(s)
@@ -24,9 +24,9 @@ Without earlier changes the step is `s <- s + R f`. Changes are stored in single
 that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may differ from the load by decades
 before convergence. s is never rescaled to the load, because solves fail then.
 
-Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As a certificate takes
-an application of A, the certificate is computed only when the rms of f is small enough, judged by the last ratio of
-certificate to rms.
+A solve ends when the certificate of an admissible pressure p and its displacement `A p + c(p)` is small enough. As a
+certificate takes an application of A, the certificate is computed only when the rms of f is small enough, judged by the
+last ratio of certificate to rms.
 
 For a lossy body sliding at constant velocity, seen from the rigid surface, A is positive but not symmetric, and there
 is no energy to minimize. `SteadySolver` solves this contact in a periodic box. In light contact, and from a start that

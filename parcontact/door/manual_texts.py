@@ -86,7 +86,8 @@ MEANINGS = Path(__file__).parent / "manual" / "keys.yaml"
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """Return `[meaning, example]` of each key of a job: a mapping from the name of a section's class to its keys."""
+    """Return the meaning and an example of each key of a job: a mapping from the name of a section's class to a mapping
+    from its keys to `[meaning, example]`."""
     found: dict[str, dict[str, Any]] = yaml.safe_load(MEANINGS.read_text(encoding="utf-8"))
     return found
 

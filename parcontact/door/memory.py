@@ -204,8 +204,8 @@ class OutOfTimeError(Exception):
 
 
 class TimedSlab(Slab):
-    """A slab that ends a trial: when the `process_time` of a rank has passed `end`, the next sum over ranks raises
-    OutOfTimeError on all ranks, once.
+    """A grid divided among ranks (`Slab`) that ends a trial: when the `process_time` of a rank has passed `end`, the
+    next sum over ranks raises OutOfTimeError on all ranks. Later sums do not raise it again.
 
     `begun` holds the processor time and the counts before the first solve.
     """
@@ -277,8 +277,8 @@ class Trial:
     """Costs of a `job`, measured in a trial on `ranks` ranks, for each stage, or for all steady states as one stage.
 
     `points` are the points of the grid that was tried, and `building` is the time in which its scene was set up [s].
-    `price` is a ratio of times of a transform of N points divided by N log N: on the grid of the job over the tried
-    grid. It is 1 if both grids are the same.
+    `price` compares transforms: the time of one, divided by N log N for its N points, on the grid of the job, divided
+    by the same number on the tried grid. It is 1 if both grids are the same.
     """
 
     job: Job

@@ -513,7 +513,8 @@ def columns_of(effects: Effects) -> tuple[str, ...]:
 
 
 def effect_values(effects: Effects, memories: Memories) -> tuple[float, ...]:
-    """Return the values of all columns of effects for the last step; raises InputError for values that do not fit."""
+    """Return the values of all columns of effects for the last step; raises InputError if an effect does not give a
+    number for each of its columns."""
     return tuple(number for name, effect in effects.items() for number in _numbers(name, effect, memories[name]))
 
 

@@ -342,7 +342,7 @@ class Directory:
                 write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
-        """Return steps and paths of the checkpoints of this verb, the newest first. Root only."""
+        """Return steps and paths of the checkpoints that this command writes, the newest first. Root only."""
         return find_checkpoints(self.path) if self.outputs.checkpoints else []
 
     def results(self) -> list[str]:

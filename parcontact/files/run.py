@@ -267,8 +267,8 @@ def chosen_by_accuracy(job: Job) -> set[str]:
     """Return the parts of the error budget that a smaller `numerics.accuracy` reduces, because the accuracy chose their
     settings.
 
-    The part "time" is among them if all stages that slide choose their steps. In a job that does not slide, all stages
-    with a duration must choose their steps.
+    The part "time" is among them if the accuracy chooses the steps of all stages that slide. In a job that does not
+    slide, this refers to all stages with a duration.
     """
     numerics = job.numerics
     lasting = [stage for stage in job.history if stage.seconds > 0.0]

@@ -542,7 +542,8 @@ class Timeline:
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """Return the number of steps in those first stages that have equal steps in both timelines."""
+        """Return the number of steps in the first stages, as far as their steps are equal in this timeline and the
+        other."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 

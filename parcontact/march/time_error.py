@@ -250,8 +250,8 @@ def centre_of(job: Job) -> Vector | None:
 
 
 def is_symmetric(centre: Vector | None, position: Vector = (0.0, 0.0)) -> bool:
-    """Return True if a shape with this `centre_of` the job has the symmetry of the grid at its `position` [cells]: its
-    centre is on a line of points, or halfway between two, along both axes."""
+    """Return True if a shape has the symmetry of the grid: along both axes its centre is on a line of points, or
+    halfway between two. `centre` is where the job puts the shape, and `position` the way it has moved since [cells]."""
     if centre is None:
         return False
     halves = (2.0 * (start + moved) for start, moved in zip(centre, position, strict=True))

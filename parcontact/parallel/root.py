@@ -128,7 +128,7 @@ class _Exchange:
         return bool(self._request.Test())
 
     def found(self) -> list[str]:
-        """Return the call of each rank, once all have been received; collective."""
+        """Return what each rank is about to do (`what`), once all ranks have told it; collective."""
         return [self.what] if self._all == self._own * self.comm.size else self.comm.allgather(self.what)
 
 

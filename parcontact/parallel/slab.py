@@ -260,8 +260,8 @@ def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return another array of this shape and type in the memory of a contiguous array, for temporary use. It needs no
-    more bytes than `array` has."""
+    """Return an array of the given shape and type for temporary use, in the memory of the contiguous `array`, which
+    must have as many bytes or more."""
     return np.ndarray(shape, dtype, buffer=array)
 
 

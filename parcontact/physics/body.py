@@ -131,7 +131,7 @@ class ElasticBody:
         return replace(memory, displacement=displacement)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement u under the pressure `alpha p`; collective. If the memory has dropped u, u is
+        """Return the displacement u under the pressure `alpha p`; collective. If `memory` no longer holds u, u is
         `alpha/modulus` times `of_pressure()`, the displacement of a body of modulus 1 under the map p."""
         if memory.displacement is None:
             memory.displacement = of_pressure()

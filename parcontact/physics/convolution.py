@@ -501,7 +501,7 @@ def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, flo
 
 
 def step_of_nodes(tiles: Tiles) -> int:
-    """Return how many points of the grid apart the nodes of the smooth part are: a divisor of SIDE."""
+    """Return the spacing of the nodes of the smooth part in points of the grid, a divisor of SIDE."""
     step = 4
     while step * NODES < max(tiles.points) and step < SIDE // FEWEST_NODES:
         step *= 2

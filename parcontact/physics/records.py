@@ -43,10 +43,10 @@ class Measures:
     * friction: tangential force divided by normal force, 0 without a compressive load;
     * force_interface [N], friction_interface: the parts of the tangential force and of `friction` from the interface;
     * approach, mean_gap [m]: approach of the rigid surface, and the mean of the gap over the box;
-    * gap_by_edges [m]: error of `mean_gap` in a free box, whose points lie half a cell beside its middle;
+    * gap_by_edges [m]: error of `mean_gap` in a free box, whose points are shifted by half a cell against the box;
     * contact_area: share of the points with pressure;
     * contact_area_corrected: `contact_area` without the excess along edges of contact;
-    * spared: share of the area that is not subtracted because points on the edge have yielded;
+    * spared: area that the correction leaves in, as points on the edge have yielded;
     * straight: 1 if all edges of contact are parallel to one axis of the grid, 0 if equal lengths of the edges are
       parallel to x and to y, as in round spots;
     * at_edge: True if an isolated contact reaches the edge of the box.
@@ -114,7 +114,7 @@ class Certificate:
         return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
 
     def shortened(self, share: float) -> "Certificate":
-        """Return the errors that follow if gaps are divided by `share` times the length."""
+        """Return the errors for a reference length that is `share` times the present `length`."""
         gaps = self.complementarity / share, self.penetration / share
         return replace(self, complementarity=gaps[0], penetration=gaps[1], length=share * self.length)
 

@@ -435,8 +435,8 @@ class TheorySettings(NamedTuple):
 
 
 def read_settings(directory: Path) -> TheorySettings | None:
-    """Return the settings of the theory table in a directory, None without any; raises InputError for a damaged
-    file."""
+    """Return the settings of the theory table in a directory, or None if it has no such table; raises InputError for a
+    damaged file."""
     path = directory / FILE
     try:
         text = path.read_bytes()

@@ -61,7 +61,7 @@ def draw_surface(sketch: Sketch, path: Path) -> None:
 
 
 def panels_of(sketch: Sketch) -> dict[str, Panel]:
-    """Return the panels of a rigid surface, each by a text on what it shows."""
+    """Return the panels of a rigid surface: a mapping from a description to the panel that it describes."""
     found, (lx, ly) = sketch.found, sketch.size
     ends = _find_ends(drawn_points(sketch.heights))
     colors = Colors(sketch.heights, (0.0, lx, 0.0, ly), Axis("height", "m"), *ends, "cividis")

@@ -83,8 +83,8 @@ class Colors:
     """A map of `values`, shape (ny, nx), on the box with the `ends` x0, x1, y0, y1 [m], in colours from the value `low`
     to the value `high`. A map in which no point has a value has low > high, and gets no colour bar.
 
-    Points without a value are NaN. They have the colour `blank`, or with a map `behind` the grey shade of this map. If
-    values above `high` exist, `clipped` is True; they get the last colour.
+    Points without a value are NaN. They have the colour `blank`, or the grey shade of the map `behind` if it is given.
+    If values above `high` exist, `clipped` is True; they get the last colour.
     """
 
     values: Array

@@ -89,7 +89,7 @@ def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
 
 @dataclass(frozen=True)
 class Filled:
-    """The map of the share s of the pressure drop in all cells, shape (ny, nx), and the conductivity of the gap [m^3]
+    """The map of s, the share of the pressure drop in each cell, shape (ny, nx), and the conductivity of the gap [m^3]
     including the small leak."""
 
     share: Map
@@ -97,8 +97,9 @@ class Filled:
 
 
 def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
-    """Return the share s of the pressure drop in all cells and the conductivity, for a map of conducting gaps [m],
-    shape (ny, nx), on a box of `size` (lx, ly) [m]. `small` is the small leak, divided by the mean of g^3."""
+    """Return the map of s, the share of the pressure drop in each cell, and the conductivity. `gap` is a map of
+    conducting gaps g [m], shape (ny, nx), on a box of `size` (lx, ly) [m]. `small` is the small leak eps of the module,
+    divided by the mean of g^3."""
     cubes = gap.T**3
     mean = float(cubes.mean())
     resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)

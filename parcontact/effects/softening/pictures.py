@@ -1,4 +1,4 @@
-"""Pictures of softening: factors of the moduli against strain, with strains of a curve."""
+"""Pictures of softening: factors of the moduli against strain, with the strains along a friction curve marked."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
