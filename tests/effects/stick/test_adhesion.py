@@ -1,6 +1,7 @@
 """Stick and slip of surfaces that attract each other: a disc under a uniform strength, energies, ranks and restarts."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,18 @@ def test_errors_of_energies_do_not_contain_a_motion_that_turns_back() -> None:
         marched(sheared(law, turned=-1.0, output={"energy": True}))[1][-1] for law in (None, {"shear_stress": 5e4})
     )
     assert rubbed.error_energy == pytest.approx(plain.error_energy, rel=1e-9, abs=0.0)
+
+
+def test_error_of_work_by_sliding() -> None:
+    """At a constant approach an elastic body gains the work of sliding. The error of a step is the difference between
+    this gain and the trapezoidal rule for the forces before and after the step."""
+    rows = marched(sheared(None, ELASTIC, output={"energy": True}))[1][9:20]  # ten steps in two directions
+    for count, (old, new) in enumerate(pairwise(rows)):
+        along = np.array([4.0, 1.0]) / math.sqrt(17.0) if count < 5 else np.array([1.0, 0.0])
+        means = [0.5 * (getattr(old.measures, name) + getattr(new.measures, name)) for name in AXES]
+        work = -(new.distance - old.distance) * (along @ means)
+        error = new.error_energy - old.error_energy
+        assert error == pytest.approx(abs(work - (new.work - old.work)), rel=1e-6, abs=1e-9 * new.error_energy)
 
 
 @pytest.mark.mpi(2, 3, 4)
