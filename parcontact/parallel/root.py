@@ -128,7 +128,7 @@ class _Exchange:
         return bool(self._request.Test())
 
     def found(self) -> list[str]:
-        """Return what each rank is about to do (`what`), once all ranks have told it; collective."""
+        """Return what each rank is about to do (`what`), once all ranks have sent this; collective."""
         return [self.what] if self._all == self._own * self.comm.size else self.comm.allgather(self.what)
 
 

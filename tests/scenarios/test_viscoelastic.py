@@ -282,9 +282,9 @@ def test_errors_of_energies_and_of_the_mean_gap() -> None:
 @pytest.mark.mpi
 @pytest.mark.parametrize("middle", [(0.5, 0.5), (0.35, 0.4), (0.64, 0.52)])
 def test_error_of_the_mean_gap_in_a_free_box(middle: tuple[float, float], comm: MPI.Intracomm) -> None:
-    """A paraboloid that hardly touches, against its mean height in closed form. The points lie half a cell beside the
-    middle of the box: the stated error covers this, where it is of first order in the cell and where it is of second
-    order, and is at most four times as large."""
+    """A paraboloid that hardly touches, against its mean height in closed form. The points are shifted by half a cell
+    against the box. The stated error covers the error by this shift, where it is of first order in the cell and where
+    it is of second order, and is at most four times as large."""
     size, points = 1e-3, 32
     ball = {"shape": "sphere", "radius": RADIUS, "center": [size * share for share in middle]}
     grid, body = {"points": points, "size": size, "boundary": "free"}, {"model": "elastic", "shear_modulus": 1e6}
